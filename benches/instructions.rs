@@ -1,14 +1,15 @@
-//! `instructions`: how many the steps of the path take (`lager_benches::steps`), counted by
-//! callgrind. Counts do not drift with the machine's load, so the guard holds them closely.
+//! `instructions`: callgrind counts the instructions of the path's steps (`lager_benches::steps`).
+//! A busy machine does not change these counts, so the guard allows them little room.
 //!
-//! What callgrind cannot see is the time of the processor itself: a cache miss, an interrupt, and
-//! the kernel's side of a system call, among them, under valgrind, reading the clock. For those the
-//! guard has ratios.
+//! callgrind does not see the processor's own time: a cache miss, an interrupt, the kernel's side
+//! of a system call. Under valgrind, reading the clock is such a call. The guard covers these by
+//! ratios.
 //!
-//! Each bench runs in a process of its own, after a setup that is not counted: the ends have met,
+//! Each bench runs in a process of its own. An uncounted setup comes first: publishers and
+//! subscribers know each other, and the dynamic linker has bound every function that it binds late.
 //! every stream is known, and every function that the dynamic linker binds late is bound.
 
-// What gungraun's macros make public has no documentation.
+// gungraun's macros make public items that have no documentation.
 #![allow(missing_docs)]
 
 use core::time::Duration;
@@ -18,7 +19,7 @@ use lager_benches::slow;
 use lager_benches::steps::{self, Ports, a_second_of_bytes, a_second_of_packets};
 use lager_bridge::arbiter::Arbiter;
 use lager_logic::Navigator;
-use lager_ports::Wake;
+use lager_wake::Wake;
 use lager_wire::{Packet, SteerCommand};
 
 #[library_benchmark]

@@ -1,6 +1,5 @@
-//! `latency/<what>/<mode>/<row>`: every row of every scenario on two cores, as `lager bench` has
-//! it. criterion measures one after the other, so compare what `lager bench` prints, where they
-//! take turns.
+//! `latency/<what>/<mode>/<row>`: criterion times every row of every scenario on two cores, one row
+//! after the other. To compare rows, use `lager bench`, where they take turns.
 
 use std::time::Duration;
 
@@ -23,7 +22,7 @@ fn main() {
                 .sample_size(10)
                 .warm_up_time(Duration::from_millis(100))
                 .measurement_time(Duration::from_secs(1));
-            // Opened when it is measured: a name that was filtered out starts no process.
+            // Opened at the first measurement: a row that the filter leaves out starts no process.
             let mut session: Option<Box<dyn Session>> = None;
             for (index, entry) in group.entries.iter().enumerate() {
                 let name = format!("{}/{}", entry.mode, entry.label);

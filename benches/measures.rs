@@ -1,14 +1,14 @@
-//! The scenarios with their real processes, from the start to the report: whether they measure what
-//! they say, end when a process dies, and leave nothing behind. No time is asserted.
+//! Tests of the scenarios with their real processes, from the start to the report: whether they
+//! measure what they say, end when a process dies, and leave nothing behind. No time is asserted.
 //!
-//! Not under the standard harness, because this executable is also its own other processes.
+//! They do not use the standard test harness, because this program is also its own child processes.
 
 use std::path::Path;
 use std::time::Duration;
 
 use lager_benches::{BenchError, FAMILY, Mode, Options, Regime, Report, Scenario, run_if_asked};
 use lager_rig::ProcessError;
-use lager_rig::told::children;
+use lager_rig::proc::children;
 use rustix::process::{Pid, Signal, kill_process};
 
 fn main() {
@@ -16,7 +16,7 @@ fn main() {
     macro_rules! named {
         ($($test:ident),* $(,)?) => { [$((stringify!($test), $test as fn())),*] };
     }
-    // As under the standard harness: a word chooses the tests whose names contain it.
+    // As under the standard harness, a word chooses the tests whose names contain it.
     let chosen = std::env::args().skip(1).find(|word| !word.starts_with('-'));
     let chosen = chosen.unwrap_or_default();
     for (name, test) in named![
@@ -42,7 +42,7 @@ fn options(modes: &[Mode], regime: Regime) -> Options {
 }
 
 fn a_hop_yields_every_row_once() {
-    // The cheapest measurement: one core, nobody spins.
+    // The cheapest measurement: one core, and no receiver spins.
     let report = Scenario::Hop
         .measure(&options(&[Mode::Block], Regime::SameCore))
         .expect("a report");
@@ -86,7 +86,7 @@ fn a_killed_process_ends_the_measurement() {
     let killer = std::thread::spawn(|| {
         loop {
             if let Some(child) = children(std::process::id()).first() {
-                // Some way into its work, wherever that is.
+                // At any point of its work.
                 std::thread::sleep(Duration::from_millis(30));
                 let child = Pid::from_raw(*child as i32).expect("not 0");
                 if kill_process(child, Signal::KILL).is_ok() {
@@ -112,7 +112,7 @@ fn what_cannot_be_measured_is_refused() {
     );
 }
 
-/// What measurements of this process have left in shared memory and among temporary files.
+/// The shared memory and temporary files that measurements of this process have left.
 fn left_behind() -> Vec<String> {
     let own = format!("{FAMILY}-{}-", std::process::id());
     [Path::new("/dev/shm"), &std::env::temp_dir()]

@@ -1,6 +1,6 @@
-//! `codec/*`, `publish/*`, `receive`, `decide` and `arbitrate`: the steps of the path within this
-//! process (`lager_benches::steps`), in time. What they take of the processor is counted by
-//! `instructions`, which a busy machine does not disturb.
+//! `codec/*`, `publish/*`, `receive`, `decide` and `arbitrate`: criterion times the steps of the
+//! path within this process (`lager_benches::steps`). `instructions` counts their instructions,
+//! which a busy machine does not change.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use criterion::{BatchSize, Bencher, Criterion, Throughput, criterion_group, criterion_main};
 use lager_benches::steps::{self, Ports, a_second_of_bytes, a_second_of_packets};
 
-/// Beside decoding stands copying the same bytes, which is the least any decoder can do.
+/// Beside decoding it times a copy of the same bytes: any decoder must do at least that.
 fn codec(criterion: &mut Criterion) {
     let (bytes, packets) = (a_second_of_bytes(), a_second_of_packets());
     let mut group = criterion.benchmark_group("codec");
@@ -31,7 +31,7 @@ fn codec(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Times `step` on ports with so many subscribers, each time after `before`.
+/// Times `step` on ports with this number of subscribers, each time after `before`.
 fn timed(
     bencher: &mut Bencher<'_>,
     subscribers: usize,
@@ -51,7 +51,7 @@ fn timed(
     });
 }
 
-/// Nobody's queue is ever full: what was published before is received first.
+/// No queue is ever full: the earlier sample is received first.
 fn publish(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("publish");
     for subscribers in [1, 8, 64] {
@@ -70,7 +70,7 @@ fn receive(criterion: &mut Criterion) {
     });
 }
 
-/// One iteration decides on the line frames of a second.
+/// One iteration decides on the line frames of one second.
 fn decide(criterion: &mut Criterion) {
     criterion.bench_function("decide/second-of-frames", |bencher| {
         let decide = |navigator: &mut _| steps::navigate(navigator, Duration::ZERO);

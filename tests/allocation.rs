@@ -1,21 +1,23 @@
-//! Bridge and logic allocate nothing per frame once they run: a counting allocator watches the
-//! whole of both services, threads included, while the robot drives.
+//! Tests that bridge and logic allocate nothing per frame once they run. A counting allocator
+//! watches both services with all their threads while the robot drives.
 //!
-//! The robot itself runs in a process of its own, so that only the two services and this test's
-//! sleeping thread are counted.
+//! The robot itself runs in another process, so the counter sees only the two services and this
+//! test's sleeping thread.
 
 use std::time::Duration;
 
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
+use lager_orders::Mode;
 use lager_plant::Warehouse;
-use lager_ports::{Bus, Cause, Shutdown};
+use lager_ports::{Bus, Cause};
 use lager_rig::allocations::{self, Counting};
 use lager_tests::{Domain, wait_for};
 use lager_topics::{
-    Ask, AskKind, BridgeRequest, LinkHealth, MapProduct, MissionOrder, Mode, NavMap, NavStatus,
-    Order, Phase, Role, SensorLine, Side, SteeringState, WarehouseMap,
+    Ask, AskKind, BridgeRequest, LinkHealth, MissionOrder, NavMap, NavStatus, Order, Phase, Role,
+    SensorLine, SteeringState, WarehouseMap,
 };
+use lager_wake::Shutdown;
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -59,7 +61,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
         scope.spawn(move || {
             lager_logic::run(&bus(Role::Logic), &LogicConfig::default(), shutdown).expect("logic");
         });
-        // Whatever fails below, the services must end, or the scope never does.
+        // Whatever fails below, the services must end, or the scope waits for them for ever.
         let _end = EndAtLast(shutdown);
 
         wait_for("the boards", || {
@@ -93,10 +95,10 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
                 .filter(|status| status.phase.get() == Some(Phase::Driving))
                 .map(|_| ())
         });
-        // The first frames may still fill caches below: let a second pass.
+        // The first frames may still fill caches in the libraries, so a second passes first.
         std::thread::sleep(Duration::from_secs(1));
 
-        // Counting begins with the first sample that is received.
+        // The count begins when the first samples have been received.
         let mut line = operator.subscriber::<SensorLine>().expect("a topic");
         let mut state = operator.subscriber::<SteeringState>().expect("a topic");
         wait_for("a line frame", || {
@@ -104,8 +106,8 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
         });
         wait_for("a report", || state.latest().expect("readable").map(|_| ()));
         let before = allocations::of_all_threads();
-        // From driving over the next crossing to the station: decisions are made, not only frames
-        // passed on.
+        // The robot drives over the next crossing to the station, so the services also make
+        // decisions.
         let frames = wait_for("2000 frames", || {
             line.latest().expect("readable");
             state.latest().expect("readable");
@@ -115,7 +117,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
         let after = allocations::of_all_threads();
         assert_eq!(after - before, 0, "allocations over {frames} frames");
     });
-    // The shutdown rings the services, so it has the bells open.
+    // The shutdown rings the services, so this process opens the bells.
     drop((
         robot, map, orders, client, health, status, operator, shutdown,
     ));
@@ -134,23 +136,6 @@ impl Drop for EndAtLast<'_> {
 /// The built-in small warehouse as the bus carries it.
 fn small_map() -> WarehouseMap {
     let warehouse = Warehouse::builtin("small").expect("built in");
-    let mut map = WarehouseMap {
-        width: warehouse.size[0],
-        height: warehouse.size[1],
-        delivery_x: warehouse.delivery[0],
-        delivery_y: warehouse.delivery[1],
-        side_length_cm: warehouse.side_length_cm,
-        ..WarehouseMap::default()
-    };
-    for (slot, (id, square, side)) in map.products.iter_mut().zip(warehouse.map_products()) {
-        *slot = MapProduct {
-            id,
-            x: square[0],
-            y: square[1],
-            side: [Side::Left, Side::Up, Side::Right, Side::Down][side as usize].into(),
-            ..MapProduct::default()
-        };
-        map.product_count += 1;
-    }
-    map
+    let (side, grid, products) = warehouse.told().expect("a floor");
+    WarehouseMap::new(side, grid, &products)
 }

@@ -1,6 +1,5 @@
-//! A cable between the bridge and a board: a thread that passes bytes on between two ptys. Its half
-//! towards the bridge can be cut, both can be made noisy, and it knows when the bridge last said
-//! something.
+//! A cable between the bridge and a board: a thread that passes bytes between two ptys. A test can
+//! cut its half towards the bridge, and can ask when the bridge last sent something.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,18 +7,17 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use lager_ports::Clock;
+use lager_home::Clock;
 use lager_pty::Port;
 use rustix::fs::{Mode, OFlags, open};
 
-/// How often the thread looks for bytes: many times between two reports.
+/// How often the thread looks for bytes: many times between two reports of a board.
 const LOOK: Duration = Duration::from_micros(500);
 
-/// The cable; unplugged when it is dropped.
+/// The cable. Dropping it unplugs it.
 #[derive(Debug)]
 pub struct Cable {
     cut: Arc<AtomicBool>,
-    noisy: Arc<AtomicBool>,
     unplugged: Arc<AtomicBool>,
     spoken_ns: Arc<AtomicU64>,
     thread: Option<JoinHandle<()>>,
@@ -29,7 +27,7 @@ impl Cable {
     /// Plugs a cable into the board's port and makes the bridge's port at `bridge`.
     ///
     /// # Panics
-    /// When a port cannot be had.
+    /// When the kernel refuses a port.
     #[must_use]
     pub fn plug(board: &Path, bridge: &Path) -> Self {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
@@ -37,15 +35,12 @@ impl Cable {
         let mut port = Port::create(bridge).expect("a pty");
         let cut = Arc::new(AtomicBool::new(false));
         let unplugged = Arc::new(AtomicBool::new(false));
-        let noisy = Arc::new(AtomicBool::new(false));
         let spoken_ns = Arc::new(AtomicU64::new(0));
-        let is_noisy = Arc::clone(&noisy);
         let (is_cut, is_unplugged) = (Arc::clone(&cut), Arc::clone(&unplugged));
         let spoken = Arc::clone(&spoken_ns);
         let thread = std::thread::spawn(move || {
             let mut commands = Vec::new();
             let mut reports = [0; 4096];
-            let mut noise = Noise(0x2545_f491_4f6c_dd1d);
             while !is_unplugged.load(Ordering::Relaxed) {
                 port.look();
                 commands.clear();
@@ -53,17 +48,11 @@ impl Cable {
                 if !commands.is_empty() {
                     spoken.store(Clock::monotonic_ns(), Ordering::Relaxed);
                 }
-                if is_noisy.load(Ordering::Relaxed) {
-                    noise.spoil(&mut commands);
-                }
                 let mut rest = &commands[..];
                 while let Ok(count @ 1..) = rustix::io::write(&board, rest) {
                     rest = &rest[count..];
                 }
                 while let Ok(count @ 1..) = rustix::io::read(&board, &mut reports) {
-                    if is_noisy.load(Ordering::Relaxed) {
-                        noise.spoil(&mut reports[..count]);
-                    }
                     if !is_cut.load(Ordering::Relaxed) {
                         port.write(&reports[..count]);
                     }
@@ -73,43 +62,21 @@ impl Cable {
         });
         Self {
             cut,
-            noisy,
             unplugged,
             spoken_ns,
             thread: Some(thread),
         }
     }
 
-    /// When the bridge last said something, in ns of CLOCK_MONOTONIC; 0 before its first word.
+    /// When the bridge last sent something, in ns of `CLOCK_MONOTONIC`; 0 = not yet.
     #[must_use]
     pub fn spoken_ns(&self) -> u64 {
         self.spoken_ns.load(Ordering::Relaxed)
     }
 
-    /// Cuts what the board says, or mends it; what the bridge says gets through all the time.
+    /// Cuts or mends the direction from the board to the bridge. The other direction always works.
     pub fn cut_reports(&self, cut: bool) {
         self.cut.store(cut, Ordering::Relaxed);
-    }
-
-    /// Spoils a byte in eight of what both ends say, or none.
-    pub fn make_noise(&self, noise: bool) {
-        self.noisy.store(noise, Ordering::Relaxed);
-    }
-}
-
-/// A generator of random numbers (xorshift), the same in each run.
-struct Noise(u64);
-
-impl Noise {
-    fn spoil(&mut self, bytes: &mut [u8]) {
-        for byte in bytes {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            if self.0.is_multiple_of(8) {
-                *byte ^= (self.0 >> 32) as u8 | 1;
-            }
-        }
     }
 }
 

@@ -1,16 +1,16 @@
-//! The robot on its boards' real images: `lager up --body chip`, with the emulator as a process
-//! that can be slow, stopped or killed. `tests/run` builds the emulator and the images first.
+//! The robot on its boards' real images: `lager up --body chip`, whose emulator is a process that a
+//! test can slow, stop or kill. `tests/run` builds the emulator and the images first.
 
 use std::fs;
-use std::path::Path;
 use std::time::Duration;
 
-use lager_ports::{Bus, BusConfig, Clock, Subscriber};
-use lager_tests::{Domain, Running, children, has_ended, is_stopped, pid, wait_for};
+use lager_home::Clock;
+use lager_ports::{Bus, BusConfig, Subscriber};
+use lager_tests::{Domain, Running, children, has_ended, in_tree, is_stopped, pid, wait_for};
 use lager_topics::{GoodState, LinkHealth, NavStatus, Phase, Role, TruthPose};
 use rustix::process::{Signal, kill_process};
 
-/// How long the chips are held up.
+/// How long a test stops the emulator.
 const HELD_UP: Duration = Duration::from_millis(1_500);
 
 const MISSION: [&str; 8] = [
@@ -24,11 +24,7 @@ const MISSION: [&str; 8] = [
     "--json",
 ];
 
-/// A file of the source tree.
-fn built(path: &str) -> String {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
-    file.to_str().expect("a path in UTF-8").to_owned()
-}
+const IMAGES: &str = "firmware/avr/target/images";
 
 /// A mission on the images.
 fn up(domain: &Domain, more: &[&str]) -> Running {
@@ -36,33 +32,27 @@ fn up(domain: &Domain, more: &[&str]) -> Running {
     started(domain, &arguments)
 }
 
-/// `lager` with the images. They are not found from a program that is built elsewhere.
+/// `lager` with the images. Built in another target folder it does not find them without a path.
 fn started(domain: &Domain, given: &[&str]) -> Running {
-    let mut arguments: Vec<String> = given.iter().map(ToString::to_string).collect();
-    for (flag, path) in [
-        (
-            "--emulator",
-            "firmware/emulator/target/release/lager-emulator",
-        ),
-        ("--images", "firmware/avr/target/images"),
-    ] {
+    let emulator = lager_tests::emulator();
+    let mut command = domain.lager(given);
+    for (flag, path) in [("--emulator", emulator), ("--images", in_tree(IMAGES))] {
         if std::env::var_os("CARGO_TARGET_DIR").is_some() && !given.contains(&flag) {
-            arguments.extend([flag.to_owned(), built(path)]);
+            command.arg(flag).arg(path);
         }
     }
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    domain.start(&arguments)
+    domain.launch(command)
 }
 
-/// What an observer sees of the robot, by the robot's own clock.
-struct Watch {
+/// An observer of the robot, with the robot's own clock.
+struct ChipObserver {
     clock: Clock,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
     truth: Subscriber<TruthPose>,
 }
 
-impl Watch {
+impl ChipObserver {
     /// Joins as soon as the robot has a clock.
     fn new(domain: &Domain, up: &mut Running) -> Self {
         let config = BusConfig {
@@ -89,8 +79,8 @@ impl Watch {
         });
     }
 
-    /// Waits for the end of the mission and returns its JSON, after the world has shown product 1
-    /// where it was to be brought.
+    /// Waits for the end of the mission and returns its JSON. Before that it waits until the world
+    /// shows product 1 at its destination.
     fn delivered(&mut self, up: &mut Running) -> serde_json::Value {
         let mut state = None;
         while up.is_running() {
@@ -117,18 +107,27 @@ fn emulator(up: &Running) -> u32 {
 
 #[test]
 fn a_mission_on_the_real_images_is_delivered_even_if_they_are_held_up() {
-    // Other work on the machine may keep a reader from its core for longer than its queue lasts, a
-    // quarter of a second, and that is a loss. One of three missions must be without, also where
-    // the chips are slower than real time: their frames are then as much slower.
-    let mut lossy = Vec::new();
-    while lossy.len() < 3 {
-        let told = held_up_mission();
-        if told["lost"] == 0 {
-            return;
-        }
-        lossy.push(told);
-    }
-    panic!("frames lost in each mission: {lossy:#?}");
+    let domain = Domain::new();
+    let mut up = up(&domain, &[]);
+    let mut watch = ChipObserver::new(&domain, &mut up);
+    watch.wait_until(&mut up, Phase::Driving);
+
+    let chips = emulator(&up);
+    kill_process(pid(chips), Signal::STOP).expect("a living emulator");
+    wait_for("the emulator to stop", || is_stopped(chips).then_some(()));
+    let before = watch.clock.now();
+    std::thread::sleep(HELD_UP);
+    assert_eq!(watch.clock.now(), before, "the robot's time stands still");
+    kill_process(pid(chips), Signal::CONT).expect("a living emulator");
+    wait_for("time to go on", || {
+        (watch.clock.now() > before + Duration::from_millis(500)).then_some(())
+    });
+
+    let told = watch.delivered(&mut up);
+    assert_eq!(told["restarts"], 0, "{told}\n{}", up.log());
+    assert!(!up.log().contains("silent"), "{}", up.log());
+    drop(watch);
+    domain.assert_clean();
 }
 
 #[test]
@@ -136,11 +135,11 @@ fn gains_outlive_a_clean_end() {
     let domain = Domain::new();
     let steering = domain.eeprom("r1").join("steering.eeprom");
     let mut up = up(&domain, &[]);
-    let mut watch = Watch::new(&domain, &mut up);
+    let mut watch = ChipObserver::new(&domain, &mut up);
     watch.wait_until(&mut up, Phase::Driving);
     let told = domain.run(&["gains", "7", "9"]);
     assert!(told.status.success(), "{told:?}");
-    // A save takes a board fifty milliseconds of its time.
+    // A board takes 50 ms of its time for one save.
     let kept = wait_for("the gains to be kept", || {
         fs::read(&steering)
             .ok()
@@ -148,12 +147,12 @@ fn gains_outlive_a_clean_end() {
     });
     drop(watch);
     up.signal(Signal::INT);
-    // Interrupted before the mission was delivered.
+    // The test interrupts it before the mission is delivered.
     assert_eq!(up.wait(), Some(3), "{}", up.log());
     assert_eq!(fs::read(&steering).expect("it is still there"), kept);
 
     let mut again = self::up(&domain, &[]);
-    let mut watch = Watch::new(&domain, &mut again);
+    let mut watch = ChipObserver::new(&domain, &mut again);
     watch.wait_until(&mut again, Phase::Driving);
     drop(watch);
     again.signal(Signal::INT);
@@ -168,7 +167,7 @@ fn a_robot_on_the_images_is_put_down_by_hand_and_drives_from_there() {
         &domain,
         &["up", "--body", "chip", "--headless", "--mission", "1"],
     );
-    let mut watch = Watch::new(&domain, &mut up);
+    let mut watch = ChipObserver::new(&domain, &mut up);
     watch.wait_until(&mut up, Phase::Driving);
     let run = |args: &[&str]| domain.done(args);
     run(&["mode", "manual"]);
@@ -178,7 +177,7 @@ fn a_robot_on_the_images_is_put_down_by_hand_and_drives_from_there() {
         ((status.x, status.y) == (1, 2))
             .then(|| wait_for("the truth", || watch.truth.latest().ok()?))
     });
-    // The world of the images has things, too; they outlive the emulator.
+    // The world of the images has movable things, too; they outlive the emulator.
     run(&["obstacle", "put", "0,1,up"]);
     let refused = domain.run(&["obstacle", "put", "1,2,down"]);
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
@@ -213,39 +212,13 @@ fn a_robot_on_the_images_is_put_down_by_hand_and_drives_from_there() {
     domain.assert_clean();
 }
 
-/// One mission, with its chips held up for far longer than a board may be silent.
-fn held_up_mission() -> serde_json::Value {
-    let domain = Domain::new();
-    let mut up = up(&domain, &[]);
-    let mut watch = Watch::new(&domain, &mut up);
-    watch.wait_until(&mut up, Phase::Driving);
-
-    let chips = emulator(&up);
-    kill_process(pid(chips), Signal::STOP).expect("a living emulator");
-    wait_for("the emulator to stop", || is_stopped(chips).then_some(()));
-    let before = watch.clock.now();
-    std::thread::sleep(HELD_UP);
-    assert_eq!(watch.clock.now(), before, "the robot's time stands still");
-    kill_process(pid(chips), Signal::CONT).expect("a living emulator");
-    wait_for("time to go on", || {
-        (watch.clock.now() > before + Duration::from_millis(500)).then_some(())
-    });
-
-    let told = watch.delivered(&mut up);
-    assert_eq!(told["restarts"], 0, "{told}\n{}", up.log());
-    assert!(!up.log().contains("silent"), "{}", up.log());
-    drop(watch);
-    domain.assert_clean();
-    told
-}
-
 #[test]
 fn a_killed_emulator_is_started_again_and_the_mission_ends() {
     let domain = Domain::new();
-    // As fast as the machine can: the services follow.
+    // `--speed 20`: as fast as the machine can, and the services keep up.
     let mut up = up(&domain, &["--speed", "20"]);
-    let mut watch = Watch::new(&domain, &mut up);
-    let restarted = |watch: &mut Watch, up: &mut Running, victim: u32, chips: u32| {
+    let mut watch = ChipObserver::new(&domain, &mut up);
+    let restarted = |watch: &mut ChipObserver, up: &mut Running, victim: u32, chips: u32| {
         let before = watch.clock.now();
         kill_process(pid(victim), Signal::KILL).expect("a living process");
         wait_for("the emulator to end", || has_ended(chips).then_some(()));
@@ -268,7 +241,7 @@ fn a_killed_emulator_is_started_again_and_the_mission_ends() {
     watch.wait_until(&mut up, Phase::Driving);
     let first = emulator(&up);
     let second = restarted(&mut watch, &mut up, first, first);
-    // The service that owns it takes it along.
+    // When the service that started the emulator ends, it ends the emulator, too.
     watch.wait_until(&mut up, Phase::Leaving);
     let service = up.service("emulator").expect("a service");
     restarted(&mut watch, &mut up, service, second);
@@ -283,7 +256,7 @@ fn a_killed_emulator_is_started_again_and_the_mission_ends() {
 fn a_killed_supervisor_takes_the_emulator_along_and_the_next_one_starts() {
     let domain = Domain::new();
     let mut first = up(&domain, &[]);
-    let mut watch = Watch::new(&domain, &mut first);
+    let mut watch = ChipObserver::new(&domain, &mut first);
     watch.wait_until(&mut first, Phase::Driving);
     let (service, chips) = (
         first.service("emulator").expect("a service"),
@@ -297,9 +270,9 @@ fn a_killed_supervisor_takes_the_emulator_along_and_the_next_one_starts() {
     }
 
     let mut second = up(&domain, &[]);
-    // The page of the killed robot may still be there for a moment; this one's time moves.
+    // The clock page of the killed robot may still exist for a moment; the new robot's time moves.
     wait_for("the next robot to drive", || {
-        let mut watch = Watch::new(&domain, &mut second);
+        let mut watch = ChipObserver::new(&domain, &mut second);
         let start = watch.clock.now();
         let moves = (0..1_000).any(|_| {
             std::thread::sleep(Duration::from_millis(1));
@@ -344,8 +317,9 @@ fn what_is_missing_is_an_error_that_tells_how_to_build_it() {
 #[test]
 fn images_for_another_baud_rate_are_told_and_given_up() {
     let domain = Domain::new();
-    let images = built("firmware/avr/target/images");
-    let mut up = up(&domain, &["--baud", "9600", "--images", &images]);
+    let images = in_tree(IMAGES);
+    let images = images.to_str().expect("a path in UTF-8");
+    let mut up = up(&domain, &["--baud", "9600", "--images", images]);
     assert_eq!(up.wait(), Some(1), "{}", up.log());
     let log = up.log();
     assert!(

@@ -1,42 +1,12 @@
-//! The robot as people start it: real processes, real packets over ptys, a real bus.
+//! Tests of the robot as people start it: real processes, real packets over ptys, a real bus.
 
 use lager_tests::{Domain, pid, wait_for};
-use lager_topics::{Mode, NavStatus, NavigatorStatus, Phase, SteeringState};
+use lager_topics::{NavStatus, NavigatorStatus, Phase, SteeringState};
 use rustix::process::{Signal, kill_process};
 use serde_json::Value;
 
 #[test]
 fn a_mission_is_delivered_and_told_in_one_json_line() {
-    // Other work on the machine may keep a reader from its core for longer than its queue holds,
-    // and that is a loss. Of three missions one must be without, unless another machine on the same
-    // processor took a second of it. Faster than real time a shorter stall is enough, and losses
-    // are only told.
-    let stolen_before = stolen_centiseconds();
-    let lost: Vec<u64> = (0..3)
-        .map(|_| mission_at("1"))
-        .take_while(|lost| *lost > 0)
-        .collect();
-    let stolen = stolen_centiseconds() - stolen_before;
-    assert!(
-        lost.len() < 3 || stolen > 100,
-        "frames lost: {lost:?}; {stolen} hundredths of a second stolen"
-    );
-    mission_at("2");
-}
-
-/// For how long other machines have had this one's processors, in hundredths of a second: `steal`
-/// of proc(5).
-fn stolen_centiseconds() -> u64 {
-    let stat = std::fs::read_to_string("/proc/stat").expect("Linux has it");
-    let steal = stat
-        .split_whitespace()
-        .nth(8)
-        .expect("a line of a kernel since 2.6.11");
-    steal.parse().expect("a number")
-}
-
-/// Runs a mission; how many frames were lost.
-fn mission_at(speed: &str) -> u64 {
     let domain = Domain::new();
     let mut up = domain.start(&[
         "up",
@@ -46,7 +16,7 @@ fn mission_at(speed: &str) -> u64 {
         "--exit-when-done",
         "--json",
         "--speed",
-        speed,
+        "2",
     ]);
     assert_eq!(up.wait(), Some(0), "{}", up.log());
     let told = up.json();
@@ -55,10 +25,10 @@ fn mission_at(speed: &str) -> u64 {
     let frames = told["frames"].as_u64().expect("frames");
     let lost = told["lost"].as_u64().expect("lost");
     let sim = told["sim_seconds"].as_f64().expect("sim_seconds");
-    // 200 sensor packets and 200 reports a second, less the time to start.
+    // 200 sensor packets and 200 reports a second, less during the start. If others keep a reader
+    // from its core until its queue is full, the reader counts a loss.
     assert!((frames + lost) as f64 > 200.0 * sim, "{told}");
     domain.assert_clean();
-    lost
 }
 
 #[test]
@@ -127,7 +97,7 @@ fn the_terminal_says_what_the_robot_does_and_a_person_orders_more() {
             .filter(|status| status.delivered == 1 && status.product == 2)
             .map(|_| ())
     });
-    // What tells of it follows what shows it.
+    // The log reports a delivery after the state shows it.
     for words in [
         "fetches product 1",
         "is in position at product 1",
@@ -202,57 +172,6 @@ fn ctrl_c_stops_the_motors_and_leaves_nothing() {
 }
 
 #[test]
-fn a_stop_latches_until_it_is_resumed() {
-    let domain = Domain::new();
-    let mut up = domain.start(&[
-        "up",
-        "--headless",
-        "--mission",
-        "1",
-        "--exit-when-done",
-        "--json",
-        "--speed",
-        "3",
-    ]);
-    let observer = domain.observe("r1", 3.0);
-    let mut state = observer.subscriber::<SteeringState>().expect("a topic");
-    let mut status = observer.subscriber::<NavStatus>().expect("a topic");
-    wait_for("the robot to drive", || {
-        state
-            .latest()
-            .expect("readable")
-            .filter(|report| report.left_duty > 0)
-            .map(|_| ())
-    });
-    assert!(domain.run(&["stop"]).status.success());
-    wait_for("the robot to stand", || {
-        state
-            .latest()
-            .expect("readable")
-            .filter(|report| report.left_duty == 0 && report.right_duty == 0)
-            .map(|_| ())
-    });
-    // Logic goes on renewing its orders; none of the next 400 reports shows a duty.
-    let mut seen = 0;
-    while seen < 400 {
-        let report = wait_for("a report", || state.receive().expect("readable"));
-        assert_eq!((report.left_duty, report.right_duty), (0, 0));
-        seen += 1;
-    }
-    let still = wait_for("nav/status", || status.latest().expect("readable"));
-    assert_ne!(still.phase.get(), Some(Phase::Stuck));
-    assert_eq!(still.mode.get(), Some(Mode::Autonomous));
-    drop(still);
-    let refused = domain.run(&["drive", "forward"]);
-    assert!(!refused.status.success(), "driving needs a resume first");
-    assert!(domain.run(&["resume"]).status.success());
-    assert_eq!(up.wait(), Some(0), "{}", up.log());
-    assert_eq!(up.json()["delivered"], serde_json::json!([1]));
-    drop((state, status, observer));
-    domain.assert_clean();
-}
-
-#[test]
 fn a_person_can_do_everything_by_hand() {
     let domain = Domain::new();
     let _up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "3"]);
@@ -293,14 +212,14 @@ fn a_person_can_do_everything_by_hand() {
     let (fine, text) = said(&["arm", "2"]);
     assert!(!fine && text.contains("lager drive"), "{text}");
     let (fine, text) = said(&["picked"]);
-    assert!(!fine && text.contains("pick station"), "{text}");
+    assert!(!fine && text.contains("does not wait at goods"), "{text}");
     let (fine, text) = said(&["gains", "3", "1"]);
     assert!(fine && text.contains("3 and 1"), "{text}");
     for reset in [&["reset"][..], &["press", "reset"]] {
         let (fine, text) = said(reset);
         assert!(fine, "{text}");
     }
-    // Each press of the switch is the other mode.
+    // Each press of the switch changes to the other mode.
     for mode in ["logic steers", "the operator steers"] {
         let (fine, text) = said(&["press", "switch"]);
         assert!(fine && text.contains(mode), "{text}");

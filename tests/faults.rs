@@ -1,24 +1,26 @@
-//! What the robot survives: every service killed with -9 in the middle of a mission, and the
-//! supervisor itself. `tests/soak` runs the same with more kills.
+//! Tests that a mission survives `kill -9`: of every service in the middle of the mission, and of
+//! the supervisor itself. `tests/soak` runs the same tests with more kills.
 //!
-//! The bounds of 200 ms and of one second are held in virtual time by the tests of the boards and
-//! of the simulator. In real time only `tests/soak` asserts them, which wants a machine of its own.
+//! The tests of the boards and of the simulator check the bounds of 200 ms and 1 s in virtual time.
+//! In real time only `tests/soak` asserts them, on a machine that does nothing else.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use lager_ports::{BusConfig, Clock, NodeState, Subscriber};
+use lager_home::Clock;
+use lager_ports::{BusConfig, NodeState, Subscriber};
+use lager_sample::Stamp;
 use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, pid, wait_for};
-use lager_topics::{LinkHealth, NavStatus, Stamp, TruthPose};
+use lager_topics::{LinkHealth, NavStatus, TruthPose};
 use rustix::process::{Signal, kill_process};
 
-/// The safe bound on driving without being steered.
+/// The longest time that the robot may drive while nobody steers it.
 const UNSTEERED: Duration = Duration::from_millis(200);
 
-/// The bound on coming back.
+/// The longest time until a successor is at work.
 const BACK: Duration = Duration::from_secs(1);
 
-/// Kills in one mission: the arm gets no goods picked while its body dies every few seconds.
+/// Kills in one mission. More would end it: the arm cannot pick goods if its body dies too often.
 const IN_A_MISSION: u64 = 40;
 
 /// How often each service is killed: 5 in `tests/run`, more in `tests/soak`.
@@ -33,15 +35,15 @@ fn is_soak() -> bool {
     std::env::var_os("LAGER_SOAK_KILLS").is_some()
 }
 
-/// What an observer sees of the robot.
-struct Watch {
+/// An observer of the robot.
+struct KillObserver {
     config: BusConfig,
     truth: Subscriber<TruthPose>,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
 }
 
-/// What one kill came to.
+/// The result of one kill.
 struct Kill {
     service: &'static str,
     /// From the signal until the successor was at work again.
@@ -50,7 +52,7 @@ struct Kill {
     unsteered: Option<Duration>,
 }
 
-impl Watch {
+impl KillObserver {
     fn new(domain: &Domain) -> Self {
         let bus = domain.observe("r1", 1.0);
         Self {
@@ -91,7 +93,7 @@ impl Watch {
         let killed = Clock::monotonic_ns();
         kill_process(pid(victim), Signal::KILL).expect("a living service");
         let start = Instant::now();
-        // When the world showed a duty other than 0, and when somebody could steer again.
+        // When the world showed a duty other than 0, and when a service could steer again.
         let mut driven = Vec::new();
         let mut steered_again = None;
         loop {
@@ -103,7 +105,7 @@ impl Watch {
             if !up.is_running() {
                 return None;
             }
-            // What the supervisor hands over between the two is not the successor's word.
+            // What the supervisor publishes between the two processes is not the successor's.
             let successor = up.service(service).filter(|successor| *successor != victim);
             let is_back = |stamp: &Stamp| Some(stamp.writer) == successor;
             if let Some(truth) = self.truth.latest().expect("readable") {
@@ -136,7 +138,7 @@ impl Watch {
             std::thread::sleep(Duration::from_millis(1));
         }
         let back = start.elapsed();
-        wait_for("the dead to be swept", || {
+        wait_for("the dead processes' files to be removed", || {
             let nodes = lager_ports::nodes(&self.config).expect("a bus");
             let stale = nodes.iter().any(|node| node.state == NodeState::Stale);
             (!stale).then_some(())
@@ -148,8 +150,8 @@ impl Watch {
             .max()
             .unwrap_or_default();
         if is_soak() {
-            // Measured, so only where nothing else runs; the bound itself is held in virtual
-            // time, by the boards' and the simulator's tests.
+            // A time of this machine, so asserted only where nothing else runs. The boards' and the
+            // simulator's tests check the bound itself in virtual time.
             assert!(
                 unsteered <= UNSTEERED,
                 "there was duty {unsteered:?} after the {service} had been killed"
@@ -159,7 +161,7 @@ impl Watch {
         Some(Kill {
             service,
             back,
-            // A killed simulator takes the motors with it: there is nothing to see.
+            // The motors of a killed simulator are gone with it, so there is no duty to see.
             unsteered: (service != "simulator").then_some(unsteered),
         })
     }
@@ -183,7 +185,7 @@ fn a_killed_service_comes_back_and_the_mission_still_ends() {
             "--exit-when-done",
             "--json",
         ]);
-        let mut watch = Watch::new(&domain);
+        let mut watch = KillObserver::new(&domain);
         let mut of_this_mission = 0;
         'mission: loop {
             let next = left
@@ -197,8 +199,8 @@ fn a_killed_service_comes_back_and_the_mission_still_ends() {
             if !watch.wait_until_whole(&mut up) {
                 break 'mission;
             }
-            // Every kill meets the mission in another place; the steps share no factor with the
-            // lengths of drives and turns.
+            // Every kill comes at another point of the mission, since the steps of the pause share
+            // no factor with the lengths of drives and turns.
             let pause = 400 + (done.len() as u64 * 617) % 1_300;
             std::thread::sleep(Duration::from_millis(pause));
             let Some(kill) = watch.kill(&mut up, service) else {
@@ -211,7 +213,7 @@ fn a_killed_service_comes_back_and_the_mission_still_ends() {
         assert_eq!(up.wait(), Some(0), "{}", up.log());
         let told = up.json();
         assert_eq!(told["delivered"], serde_json::json!([1]), "{}", up.log());
-        // What a held-up machine kept silent for too long was started again as well.
+        // On a busy machine the supervisor also restarts services that were silent for too long.
         let restarts = told["restarts"].as_u64().expect("restarts");
         assert!(restarts >= of_this_mission, "{told}\n{}", up.log());
         assert!(
@@ -226,7 +228,7 @@ fn a_killed_service_comes_back_and_the_mission_still_ends() {
     report(&done, missions);
 }
 
-/// Prints what was measured; a figure here is no verdict.
+/// Prints the measured times. No test fails because of them.
 fn report(kills: &[Kill], missions: u32) {
     println!("{missions} missions");
     println!("service      kills   back: median    longest   last duty after");
@@ -254,7 +256,7 @@ fn report(kills: &[Kill], missions: u32) {
 #[test]
 fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
     let domain = Domain::new();
-    // The robot is a process of its own, as real boards are, and lives on.
+    // The robot is a process of its own, as real boards are, and survives the supervisor.
     let [sensor, steering] = ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
     let config = domain.folder().join("robot.toml");
     std::fs::write(
@@ -266,8 +268,8 @@ fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
     let body = domain.start(&["--config", config, "simulator"]);
     let up = ["--config", config, "up", "--script", "--mission", "1"];
     let mut first = domain.start(&up);
-    let mut watch = Watch::new(&domain);
-    let driving = |watch: &mut Watch| {
+    let mut watch = KillObserver::new(&domain);
+    let driving = |watch: &mut KillObserver| {
         wait_for("the robot to drive", || {
             watch
                 .truth
@@ -277,7 +279,7 @@ fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
                 .map(|_| ())
         });
     };
-    // Real boards start stopped.
+    // Real boards begin with a stop that a person has to release.
     let resume = || {
         wait_for("the stop to be released", || {
             let said = domain.run(&["resume"]);
@@ -303,7 +305,7 @@ fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
         wait_for("the child to end", || has_ended(service).then_some(()));
     }
 
-    // Nothing has to be cleaned by hand: the same name starts again beside the running boards.
+    // Nobody has to clean up by hand: the same name starts again beside the running boards.
     let second = domain.start(&up);
     resume();
     driving(&mut watch);

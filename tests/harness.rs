@@ -1,8 +1,8 @@
-//! What the tests with real processes share: an isolated bus for each test, the `lager` binary
-//! on it, and a look at what it leaves behind.
+//! The common helpers of the tests with real processes: an isolated bus for each test, the `lager`
+//! program on it, and a check of the files that it leaves behind.
 
 mod cable;
-mod compare;
+mod fresh;
 
 use std::fs;
 use std::net::TcpListener;
@@ -12,62 +12,78 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, BusConfig, StopPage, StopWord};
+use lager_ports::{Bus, BusConfig};
+use lager_stop::{StopPage, StopWord};
 use lager_topics::Role;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 pub use cable::Cable;
-pub use compare::{compare, compare_on_robot};
-pub use lager_rig::told::children;
+pub use fresh::fresh;
+pub use lager_rig::proc::children;
 
-/// How long a test waits for anything before it calls it stuck. It bounds a hang; it measures
-/// nothing.
+/// The longest wait for any condition. It only ends a test that hangs; it measures nothing.
 pub const WATCHDOG: Duration = Duration::from_secs(240);
 
-/// The program that people run, as this workspace builds it.
+/// A file or folder of the source tree.
+#[must_use]
+pub fn in_tree(path: &str) -> PathBuf {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    tests.parent().expect("the workspace").join(path)
+}
+
+/// The emulator of the boards. The boards' images are in `firmware/avr/target/images`.
 ///
 /// # Panics
-/// When it has not been built: `tests/run` builds it first.
+/// When it or an image is missing or older than its sources.
+#[must_use]
+pub fn emulator() -> PathBuf {
+    let images = in_tree("firmware/avr/target");
+    for image in ["sensor", "steering"] {
+        let list = images.join(format!("avr-none/release/{image}.d"));
+        built(&images.join(format!("images/{image}.elf")), &list);
+    }
+    let emulator = in_tree("firmware/emulator/target/release/lager-emulator");
+    built(&emulator, &emulator.with_extension("d"))
+}
+
+/// `lager-bench`, which `lager bench` starts.
+///
+/// # Panics
+/// When it is missing or older than its sources.
+pub fn lager_bench() -> PathBuf {
+    let bench = lager().with_file_name("lager-bench");
+    built(&bench, &bench.with_extension("d"))
+}
+
+fn built(program: &Path, list: &Path) -> PathBuf {
+    fresh(program, list).unwrap_or_else(|why| panic!("{why}"))
+}
+
+/// The program under test. cargo builds it with the tests of its own crate, so it is never older
+/// than they are, and they run in either profile.
+///
+/// # Panics
+/// When this process has no path.
 #[must_use]
 pub fn lager() -> PathBuf {
-    released("lager")
+    // target/<profile>/deps/<test>
+    let test = std::env::current_exe().expect("a path");
+    let profile = test.parent().and_then(Path::parent);
+    profile.expect("a folder of cargo's").join("lager")
 }
 
-/// A program of this workspace's release profile.
-///
-/// # Panics
-/// When it has not been built.
-#[must_use]
-pub fn released(name: &str) -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
-        || {
-            Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join("..")
-                .join("target")
-        },
-        PathBuf::from,
-    );
-    let binary = target.join("release").join(name);
-    assert!(
-        binary.is_file(),
-        "{} is missing; run tests/run, or `cargo build --release` first",
-        binary.display()
-    );
-    binary
-}
-
-/// The machine, as far as the tests of one file share it.
+/// A lock for the machine that the tests of one file share.
 static MACHINE: RwLock<()> = RwLock::new(());
 
-/// Waits until no other test of this file has a robot, and keeps them waiting. Figures want the
-/// machine to themselves, and one robot is what a small machine drives without losing a frame.
+/// Waits until no other test of this file has a robot, and keeps the others waiting. Measurements
+/// need the whole machine, and a small machine drives only one robot without losing a frame.
 pub fn alone() -> RwLockWriteGuard<'static, ()> {
-    // A test that failed has let go of the machine too.
+    // A failed test poisons the lock but has released it.
     MACHINE.write().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a test has of the machine.
+/// A test's lock on the machine.
 #[derive(Debug)]
 enum Share {
     All {
@@ -78,8 +94,8 @@ enum Share {
     },
 }
 
-/// A bus and a folder of a test's own, one at a time. Call [`Domain::assert_clean`] at the end of a
-/// test; a test that failed earlier leaves what its processes left.
+/// A bus and a folder that one test uses alone. Call [`Domain::assert_clean`] at the end of a test.
+/// If a test fails earlier, the files of its processes may stay.
 #[derive(Debug)]
 pub struct Domain {
     own: lager_rig::Domain,
@@ -87,7 +103,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// A domain no other test has, and the machine with it, as [`alone`] has it.
+    /// A domain for a test that must have the machine to itself, as with [`alone`].
     ///
     /// # Panics
     /// When its folder cannot be made.
@@ -98,8 +114,8 @@ impl Domain {
         })
     }
 
-    /// A domain no other test has, for a test that loses nothing by a few others that drive their
-    /// robots meanwhile: as many as there are test threads.
+    /// A domain for a test beside which other tests may drive their robots: at most as many as
+    /// there are test threads.
     ///
     /// # Panics
     /// When its folder cannot be made.
@@ -164,12 +180,12 @@ impl Domain {
         self.lager(args).output().expect("lager starts")
     }
 
-    /// Runs `lager` with an order that it renews until it is carried out. One that was not renewed
-    /// in time, because others kept this process from its core, is given anew, as `lager` says to
-    /// do.
+    /// Runs `lager` with an order that it renews until the robot has carried it out. If the order
+    /// ended because others kept this process from its core, gives it again, as `lager`'s sentence
+    /// advises.
     ///
     /// # Panics
-    /// When it cannot be started, or is held up for ever.
+    /// When it cannot be started, or never gets its core for long enough.
     #[must_use]
     pub fn run_renewed(&self, args: &[&str]) -> Output {
         wait_for(&format!("{args:?} to be renewed in time"), || {
@@ -181,17 +197,17 @@ impl Domain {
         })
     }
 
-    /// [`Domain::run_renewed`], which must succeed.
+    /// [`Domain::run_renewed`], and asserts that it succeeded.
     ///
     /// # Panics
-    /// When it does not, with what it said.
+    /// When it did not, with its output.
     pub fn done(&self, args: &[&str]) {
         let output = self.run_renewed(args);
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{args:?}: {said}");
     }
 
-    /// This test's own way onto the bus, as an observer of `robot`.
+    /// Opens the bus for this test, as an observer of `robot`.
     ///
     /// # Panics
     /// When the bus cannot be opened.
@@ -203,41 +219,41 @@ impl Domain {
     /// The bus of `robot` in this domain.
     ///
     /// # Panics
-    /// When the name is none.
+    /// When this is not a valid name.
     #[must_use]
     pub fn bus(&self, robot: &str, speed: f64) -> BusConfig {
         BusConfig {
-            robot: robot.parse().expect("a robot's name"),
+            unit: robot.parse().expect("a robot's name"),
             speed,
             ..self.own.config()
         }
     }
 
-    /// Where `robot` keeps its clock page if its body is emulated.
+    /// The path of `robot`'s clock page, which an emulated body has.
     #[must_use]
     pub fn clock_page(&self, robot: &str) -> PathBuf {
         self.own.folder().join(robot).join("clock")
     }
 
-    /// Where the emulated boards of `robot` keep their EEPROMs.
+    /// The folder with the EEPROMs of `robot`'s emulated boards.
     #[must_use]
     pub fn eeprom(&self, robot: &str) -> PathBuf {
         self.own.folder().join(robot).join("eeprom")
     }
 
-    /// The folder in which the bus lives.
+    /// The bus's folder.
     #[must_use]
     pub fn bus_folder(&self) -> &Path {
         self.own.folder()
     }
 
-    /// A folder of this test's own.
+    /// A folder that only this test uses.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.own.files()
     }
 
-    /// The shared memory and bookkeeping files that are left.
+    /// The shared memory and the bus's files that still exist.
     ///
     /// # Panics
     /// When the bus's folder cannot be used.
@@ -249,7 +265,7 @@ impl Domain {
             .collect()
     }
 
-    /// The last line of a test: nothing of the bus is left.
+    /// Asserts, as the last line of a test, that nothing of the bus is left.
     ///
     /// # Panics
     /// When shared memory or files of the bus are left.
@@ -259,7 +275,7 @@ impl Domain {
     }
 }
 
-/// Orders and a warehouse that are to outlive the robot, and the lock of a station that was killed.
+/// Whether this file may stay: orders, a warehouse, or the lock of a killed station.
 fn is_kept(path: &Path) -> bool {
     let is_state = path.components().any(|part| part.as_os_str() == ".state");
     let is_file = path
@@ -268,7 +284,7 @@ fn is_kept(path: &Path) -> bool {
     is_state && is_file && !path.ends_with("running.toml")
 }
 
-/// A stop word that stops nobody: it outlives every process, and only `up` tidies it away.
+/// A stop word without a stop in force. It outlives every process, and only `up` removes it.
 fn is_released_stop(path: &Path) -> bool {
     path.ends_with(StopPage::FILE)
         && StopWord::read(path).is_ok_and(|told| told.is_some_and(|told| told.stop().is_none()))
@@ -293,8 +309,7 @@ impl Domain {
 }
 
 impl Drop for Domain {
-    /// A test that fails shows what its processes logged, before its folder and its bus are
-    /// removed.
+    /// Shows the logs of a failed test before its folder and its bus are removed.
     fn drop(&mut self) {
         if std::thread::panicking() {
             self.show_logs();
@@ -308,7 +323,7 @@ impl Default for Domain {
     }
 }
 
-/// An address of this machine that is free at this moment.
+/// A free network address of this machine.
 ///
 /// # Panics
 /// When there is none.
@@ -318,7 +333,7 @@ pub fn free() -> String {
     socket.local_addr().expect("an address").to_string()
 }
 
-/// A running `lager`, killed when dropped.
+/// A running `lager`; dropping it kills the process.
 #[derive(Debug)]
 pub struct Running {
     child: Child,
@@ -333,7 +348,7 @@ impl Running {
         self.child.id()
     }
 
-    /// What it has written to standard error.
+    /// Its standard error so far.
     ///
     /// # Panics
     /// When the log cannot be read.
@@ -342,7 +357,7 @@ impl Running {
         fs::read_to_string(&self.log).expect("a readable log")
     }
 
-    /// What it has written to standard output.
+    /// Its standard output so far.
     ///
     /// # Panics
     /// When the file cannot be read.
@@ -354,7 +369,7 @@ impl Running {
     /// The one JSON line on its standard output.
     ///
     /// # Panics
-    /// When there is none, or more than that line.
+    /// When there is no line, or more than one.
     #[must_use]
     pub fn json(&self) -> Value {
         let output = self.output();
@@ -367,18 +382,18 @@ impl Running {
         serde_json::from_str(&output).expect("a JSON line")
     }
 
-    /// Whether it still runs.
+    /// Whether the process still runs.
     ///
     /// # Panics
-    /// When it cannot be asked.
+    /// When the kernel does not say so.
     pub fn is_running(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
     }
 
-    /// Waits for its end and returns the exit code.
+    /// Waits until the process ends, and returns the exit code.
     ///
     /// # Panics
-    /// When it runs past the watchdog, with its log.
+    /// When it runs longer than the watchdog allows; the message has its log.
     pub fn wait(&mut self) -> Option<i32> {
         let give_up = Instant::now() + WATCHDOG;
         loop {
@@ -390,7 +405,7 @@ impl Running {
         }
     }
 
-    /// Sends a signal.
+    /// Sends a signal to the process.
     ///
     /// # Panics
     /// When the process is gone.
@@ -421,7 +436,7 @@ impl Drop for Running {
     }
 }
 
-/// A process id as the kernel's calls want it.
+/// A process id in the type of the kernel's calls.
 ///
 /// # Panics
 /// When it is 0.
@@ -437,29 +452,29 @@ fn arguments(process: u32) -> Vec<String> {
         .collect()
 }
 
-/// Whether a process has ended; one that nobody has waited for yet counts.
+/// Whether a process has ended, even if nobody has waited for it yet.
 #[must_use]
 pub fn has_ended(process: u32) -> bool {
     state(process).is_none_or(|state| state == 'Z')
 }
 
-/// Whether a process is stopped by a signal, all of it.
+/// Whether a signal has stopped all threads of a process.
 #[must_use]
 pub fn is_stopped(process: u32) -> bool {
     state(process) == Some('T')
 }
 
-/// The state of a process as the kernel has it, if there is such a process.
+/// The kernel's letter for the state of a process; `None` if there is no such process.
 fn state(process: u32) -> Option<char> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The state follows the name, which is in parentheses and may contain anything.
+    // The state follows the name, which is in parentheses and may contain any character.
     stat.rsplit(") ").next()?.chars().next()
 }
 
-/// Waits until `done` gives something.
+/// Waits until `done` returns a value.
 ///
 /// # Panics
-/// When it takes longer than the watchdog.
+/// When that takes longer than the watchdog allows.
 pub fn wait_for<T>(what: &str, mut done: impl FnMut() -> Option<T>) -> T {
     let give_up = Instant::now() + WATCHDOG;
     loop {

@@ -1,5 +1,5 @@
-//! Goods that people call by the names of the warehouse's file, at each place where they order
-//! some.
+//! Tests that people can order goods by the names in the warehouse's file, in each place that takes
+//! an order.
 
 use std::fs;
 use std::process::Output;
@@ -34,14 +34,14 @@ fn said(output: &Output) -> String {
     format!("{out}{err}")
 }
 
-/// The warehouse's file, with this in place of that.
+/// A copy of the warehouse's file in which `to` replaces `from`.
 fn file(domain: &Domain, from: &str, to: &str) -> String {
     let path = domain.folder().join("warehouse.toml");
     fs::write(&path, WAREHOUSE.replacen(from, to, 1)).expect("a file");
     path.to_string_lossy().into_owned()
 }
 
-/// A robot that fetches screws, and is stopped once it is on the way.
+/// A robot that fetches screws and that the test stops on the way.
 fn robot(domain: &Domain, flags: &[&str]) -> Running {
     let warehouse = file(domain, "", "");
     let args = ["up", "--headless", "--warehouse", &warehouse, "--mission"];
@@ -78,7 +78,7 @@ fn goods_are_ordered_by_name_with_a_station_and_without_one() {
         let map = said(&domain.run(&["map"]));
         assert!(map.contains("product 2 (wood glue): at"), "{map}");
         assert!(map.contains("product 3: at"), "{map}");
-        // A stop would outlive the robot.
+        // A stop would outlive the robot, so the test releases it.
         domain.done(&["resume"]);
         drop(up);
         domain.assert_clean();
@@ -117,8 +117,8 @@ fn what_nothing_is_called_is_no_mission() {
 fn a_file_whose_names_would_mean_two_things_is_refused() {
     let domain = Domain::new();
     for (name, why) in [
-        ("screws", "two products are named \"screws\""),
-        ("3", "\"3\", which would be taken for its number"),
+        ("screws", "two products are named screws;"),
+        ("3", "named 3, which people would take for its number"),
     ] {
         let warehouse = file(&domain, "wood glue", name);
         for command in ["up", "station"] {

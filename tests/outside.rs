@@ -1,6 +1,8 @@
-//! A crate outside the workspace, as a user of the bus writes one: it defines a topic of its own,
-//! and the topic tools show what it publishes.
+//! Tests a crate outside the workspace, as a user of the bus would write it. The crate defines a
+//! topic of its own, and the topic tools show its samples. Neither this crate nor the examples of
+//! `lager-ports`, which it compiles as its own, need a crate of the robot.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -12,10 +14,10 @@ const MAIN: &str = r#"
 use std::{error::Error, thread::sleep, time::Duration};
 
 use lager_ports::{Bus, BusConfig, Cause};
-use lager_topics::{Qos, Role, Tag, Topic, coded, payload};
+use lager_sample::{Application, Part, Qos, Tag, Topic, coded, payload};
 
 coded! {
-    /// What grows.
+    /// The plants in a bed.
     pub enum Plant {
         /// Red.
         Tomato = 0,
@@ -27,9 +29,9 @@ coded! {
 payload! {
     /// A bed.
     pub struct Bed: 8 bytes {
-        /// In tenths of a degree.
+        /// Soil temperatures in tenths of a degree.
         pub soil: [i16; 2],
-        /// What grows there.
+        /// The plant that grows there.
         pub plant: Tag<Plant>,
         /// Fills the gap.
         pub reserved: [u8; 3],
@@ -37,11 +39,11 @@ payload! {
 }
 
 payload! {
-    /// What a greenhouse measures.
+    /// The measurements of a greenhouse.
     pub struct Greenhouse: 32 bytes {
-        /// From 0 to 1.
+        /// Humidity, from 0 to 1.
         pub humidity: f64,
-        /// How often it was watered.
+        /// The number of waterings.
         pub waterings: u32,
         /// Fills the gap.
         pub reserved: [u8; 4],
@@ -49,6 +51,10 @@ payload! {
         pub beds: [Bed; 2],
     }
 }
+
+/// It can share a bus with a robot, whose names have the same prefix and whose parts are 0 to 11.
+static GREENHOUSE: Application = Application::new("lager");
+const GARDENER: Part = Part::new(12, "gardener");
 
 struct Climate;
 
@@ -61,7 +67,7 @@ impl Topic for Climate {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).map(Into::into);
-    let bus = Bus::open(&BusConfig { folder, ..BusConfig::default() }, Role::Guest)?;
+    let bus = Bus::open(&BusConfig { folder, ..BusConfig::of(&GREENHOUSE) }, GARDENER)?;
     let climate = bus.publisher::<Climate>()?;
     let mut sample = Greenhouse { humidity: 0.75, ..Greenhouse::default() };
     sample.beds[1] = Bed { soil: [-12, 205], plant: Plant::Cucumber.into(), ..Bed::default() };
@@ -74,29 +80,38 @@ fn main() -> Result<(), Box<dyn Error>> {
 "#;
 
 fn root() -> PathBuf {
-    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
-    tests.parent().expect("the workspace").to_owned()
+    lager_tests::in_tree("")
 }
 
-/// Writes the crate, builds it and returns its program. It shares the folder of the workspace's own
-/// results, and the versions of its lock file, so that nothing is loaded and most is there already.
+/// The crates of the bus that know no robot.
+const ROBOT_FREE: [&str; 4] = ["lager-home", "lager-ports", "lager-sample", "lager-wake"];
+
+/// Writes the crate, builds it and returns its program. The build uses the workspace's target
+/// folder and lock file, so it downloads nothing and most crates are built already.
 fn build(folder: &Path) -> PathBuf {
     let root = root();
     let path = |name: &str| root.join("bus").join(name).display().to_string();
     let manifest = format!(
         "[package]\nname = \"greenhouse\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n\
-         [dependencies]\nlager-ports = {{ path = {:?} }}\nlager-topics = {{ path = {:?} }}\n\n\
-         [profile.dev]\nopt-level = 1\ndebug = false\n\n[workspace]\n",
+         [dependencies]\nlager-ports = {{ path = {:?} }}\nlager-sample = {{ path = {:?} }}\n\
+         lager-wake = {{ path = {:?} }}\n\n\
+         [profile.dev]\nopt-level = 1\ndebug = false\nlto = \"off\"\n\n[workspace]\n",
         path("ports"),
-        path("topics"),
+        path("sample"),
+        path("wake"),
     );
     fs::create_dir_all(folder.join("src")).expect("a folder");
+    fs::create_dir_all(folder.join("examples/weather")).expect("a folder");
+    for (example, here) in EXAMPLES {
+        let there = root.join("bus/ports/examples").join(example);
+        fs::copy(there, folder.join("examples").join(here)).expect("an example");
+    }
     fs::write(folder.join("Cargo.toml"), manifest).expect("a file");
     fs::write(folder.join("src/main.rs"), MAIN).expect("a file");
     fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).expect("a file");
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--offline", "--target-dir"])
+        .args(["build", "--offline", "--bins", "--examples", "--target-dir"])
         .arg(&target)
         .current_dir(folder)
         .output()
@@ -106,7 +121,33 @@ fn build(folder: &Path) -> PathBuf {
     target.join("debug").join("greenhouse")
 }
 
-/// The crate's program, killed when dropped.
+/// The examples of the bus, under names that no program of the workspace has.
+const EXAMPLES: [(&str, &str); 4] = [
+    ("act.rs", "outside-act.rs"),
+    ("observe.rs", "outside-observe.rs"),
+    ("publish.rs", "outside-publish.rs"),
+    ("weather/mod.rs", "weather/mod.rs"),
+];
+
+/// This project's crates that are compiled into the crate's program.
+fn crates_of_ours(folder: &Path) -> BTreeSet<String> {
+    let tree = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])
+        .args(["--format", "{p}"])
+        .current_dir(folder)
+        .output()
+        .expect("cargo runs");
+    let said = String::from_utf8_lossy(&tree.stderr);
+    assert!(tree.status.success(), "{said}");
+    String::from_utf8_lossy(&tree.stdout)
+        .lines()
+        .filter_map(|line| line.split(' ').next())
+        .filter(|name| name.starts_with("lager"))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The crate's program; dropping it kills the process.
 struct Program(Child);
 
 impl Drop for Program {
@@ -119,7 +160,10 @@ impl Drop for Program {
 #[test]
 fn the_tools_decode_a_topic_of_a_crate_outside_the_workspace() {
     let domain = Domain::new();
-    let program = build(&domain.folder().join("greenhouse"));
+    let folder = domain.folder().join("greenhouse");
+    let program = build(&folder);
+    let expected = ROBOT_FREE.map(str::to_owned);
+    assert_eq!(crates_of_ours(&folder), BTreeSet::from(expected));
     let running = Command::new(&program)
         .arg(domain.bus_folder())
         .stdin(Stdio::null())
@@ -167,11 +211,15 @@ fn the_tools_decode_a_topic_of_a_crate_outside_the_workspace() {
     assert!(told.contains("Greenhouse, 32 bytes"), "{told}");
     let told = domain.run(&["topic", "echo", "greenhouse/climate", "--count", "1"]);
     let told = String::from_utf8_lossy(&told.stdout).into_owned();
-    assert!(told.contains("by guest"), "{told}");
+    assert!(told.contains("by gardener"), "{told}");
 
     drop(running);
-    // The next process on the bus sweeps what the killed one has left.
+    // The next process on the bus removes the files that the killed one has left.
     let _ = domain.run(&["topic", "list"]);
+    for (_, example) in &EXAMPLES[..3] {
+        let example = Path::new(example).with_extension("");
+        let _ = fs::remove_file(program.with_file_name("examples").join(example));
+    }
     let _ = fs::remove_file(program);
     domain.assert_clean();
 }

@@ -1,5 +1,5 @@
-//! One robot, one place: who is refused, whose files are named, and what is left when nothing
-//! answers any more.
+//! Tests that one name has one robot: which second process is refused, which files the refusal
+//! names, and how the files are removed when their processes hang or are dead.
 
 use std::fs;
 use std::os::unix::process::CommandExt;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use lager_ports::Place;
+use lager_home::Home;
 use lager_rig::Cable;
 use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, lager, pid, wait_for};
 use rustix::process::{Signal, kill_process};
@@ -16,7 +16,7 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Runs a command to its end, which a hanging one does not have.
+/// Runs a command until it ends; a command that hangs fails the test.
 fn to_its_end(mut command: Command) -> Output {
     let mut child = command
         .stdout(Stdio::piped())
@@ -34,11 +34,11 @@ fn to_its_end(mut command: Command) -> Output {
     child.wait_with_output().expect("its output")
 }
 
-fn place(domain: &Domain) -> Place {
-    domain.bus("r1", 1.0).place().expect("the bus's folder")
+fn home(domain: &Domain) -> Home {
+    domain.bus("r1", 1.0).home().expect("the bus's folder")
 }
 
-/// A simulated robot, under way.
+/// A simulated robot that drives.
 fn robot(domain: &Domain) -> Running {
     let up = domain.start(&["up", "--headless", "--mission", "1,2,3"]);
     wait_for("a robot under way", || {
@@ -51,7 +51,7 @@ fn robot(domain: &Domain) -> Running {
 #[test]
 fn a_second_robot_of_a_name_is_refused_whatever_its_session() {
     let domain = Domain::new();
-    // Serial ports with nobody at the other end.
+    // Serial ports with no board behind them.
     let ports = [(); 2].map(|()| Cable::new().expect("a pseudo terminal"));
     let [sensor, steering] = ports
         .each_ref()
@@ -87,9 +87,9 @@ fn a_second_bridge_is_refused_with_the_first_ones_process() {
     second.arg(config);
     let refused = to_its_end(second);
     assert_eq!(refused.status.code(), Some(4), "{}", said(&refused));
-    let holder = format!("the bridge of robot `r1` already runs (process {bridge})");
+    let holder = format!("the bridge of `r1` already runs (process {bridge})");
     assert!(said(&refused).contains(&holder), "{}", said(&refused));
-    // The lock ends with its process: a successor takes it.
+    // The kernel releases the lock of a dead process, so a successor gets it.
     kill_process(pid(bridge), Signal::KILL).expect("a living bridge");
     wait_for("its successor", || {
         let lock = fs::read_to_string(domain.bus_folder().join("r1/bridge.lock"));
@@ -100,8 +100,8 @@ fn a_second_bridge_is_refused_with_the_first_ones_process() {
     assert_eq!(up.wait(), Some(0));
 }
 
-/// `lager` with `args`, killed at its `when`th `ftruncate`: what it was making stays without a
-/// size.
+/// Runs `lager` with `args` and kills it at its `when`th call of `ftruncate`. The file that it was
+/// making keeps the size 0.
 fn killed_half_way(domain: &Domain, when: u32, args: &[&str]) -> Output {
     let whole = domain.lager(args);
     let mut strace = Command::new("strace");
@@ -134,7 +134,7 @@ fn what_a_tool_killed_half_way_leaves_keeps_nobody_waiting() {
             assert!(ended.status.success() || args[0] == "doctor", "{ended:?}");
         }
     }
-    // The supervisor notices a death as ever, and the robot ends as ever.
+    // The supervisor notices a death and the robot ends, both as usual.
     let bridge = up.service("bridge").expect("a bridge");
     kill_process(pid(bridge), Signal::KILL).expect("a living bridge");
     wait_for("its successor", || {
@@ -149,7 +149,7 @@ fn of_a_robot_that_was_killed_whole_doctor_leaves_nothing() {
     let domain = Domain::new();
     let up = robot(&domain);
     let processes: Vec<u32> = children(up.pid()).into_iter().chain([up.pid()]).collect();
-    // None of them can put anything in order.
+    // A frozen process cannot clean up.
     let all = |signal| {
         for process in &processes {
             let _ = kill_process(pid(*process), signal);
@@ -163,8 +163,8 @@ fn of_a_robot_that_was_killed_whole_doctor_leaves_nothing() {
             .all(|process| has_ended(*process))
             .then_some(())
     });
-    for (number, segment) in place(&domain).segments().iter().enumerate() {
-        // Whatever the files hold: some are as they were, some empty, some short, some noise.
+    for (number, segment) in home(&domain).segments().iter().enumerate() {
+        // Some files stay as they were; others become empty, short or random.
         match number % 4 {
             1 => fs::write(segment, []),
             2 => fs::write(segment, [0x55; 100]),
@@ -183,7 +183,7 @@ fn of_a_robot_that_was_killed_whole_doctor_leaves_nothing() {
     let left = domain.leftovers();
     let stop = |path: &String| path.ends_with("/stop");
     assert!(left.iter().all(stop), "{report}\n{left:#?}");
-    assert_eq!(place(&domain).segments(), Vec::<PathBuf>::new());
+    assert_eq!(home(&domain).segments(), Vec::<PathBuf>::new());
 }
 
 #[test]
@@ -191,13 +191,13 @@ fn another_user_is_told_whose_the_robot_is() {
     let domain = Domain::new();
     let _up = robot(&domain);
     if !rustix::process::geteuid().is_root() {
-        // Only root can become somebody else; everybody else is somebody else than root.
+        // Root starts it as another user; any other user tries files of root.
         let mut other = Command::new(lager());
         other.args(["--bus", "/proc/1/task", "topic", "list"]);
         assert!(said(&to_its_end(other)).contains("sudo -u root lager"));
         return;
     }
-    // A copy where everybody may go.
+    // A copy of the program in a folder that every user may enter.
     let program = PathBuf::from(format!("/dev/shm/lager-{}-program", std::process::id()));
     fs::copy(lager(), &program).expect("room for a copy");
     let mut other = Command::new(&program);
@@ -234,7 +234,7 @@ fn python_joins_with_what_config_prints() {
     assert_eq!(up.wait(), Some(0));
 }
 
-/// Joins the bus of a configuration file and lists its services.
+/// A Python program that joins the bus of a configuration file and lists its services.
 const PYTHON: &str = "
 import sys, iceoryx2 as iox2
 config = iox2.config.from_file(iox2.FilePath.new(sys.argv[1]))

@@ -1,4 +1,4 @@
-//! The Python package `bus/python`, in the environment into which `tests/run` has installed it.
+//! Tests of the Python package `bus/python`, in the environment into which `tests/run` installs it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -6,30 +6,30 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lager_ports::{BUS_VERSION, Bus, BusConfig, Cause, Publisher, Subscriber};
-use lager_tests::Domain;
+use lager_sample::{Make, Qos, Stamp, StructInfo, Tag, Topic, coded, payload};
+use lager_tests::{Domain, in_tree};
 use lager_topics::{
-    LineFrame, Make, NavMap, OBSERVERS, Qos, Role, SensorDistance, SensorLine, Stamp, StructInfo,
-    TOPICS, Tag, Topic, WarehouseMap, coded, payload,
+    LAGER, LineFrame, NavMap, Role, SensorDistance, SensorLine, TOPICS, WarehouseMap,
 };
 use lager_wire::LineState;
 use serde_json::{Value, json};
 
 coded! {
-    /// What the sky looks like.
+    /// The state of the sky.
     pub enum Sky {
-        /// Nothing is in it.
+        /// No clouds.
         Clear = 0,
-        /// It is not seen.
+        /// The sky cannot be seen.
         Fog = 7,
     }
 }
 
 payload! {
-    /// What a weather station sees.
+    /// The measurements of a weather station.
     pub struct Weather: 24 bytes {
         /// Wind in mm/s.
         pub wind: u32,
-        /// From where it blows, in degrees.
+        /// The direction from which the wind blows, in degrees.
         pub from: u16,
         /// The sky.
         pub sky: Tag<Sky>,
@@ -40,7 +40,7 @@ payload! {
     }
 }
 
-/// A topic that is in no table.
+/// A topic that the robot's table does not have.
 #[derive(Clone, Copy, Debug)]
 struct WeatherNow;
 
@@ -51,9 +51,7 @@ impl Topic for WeatherNow {
     const SUMMARY: &'static str = "The weather.";
 }
 
-const PACKAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../bus/python");
-
-/// The number of frames of the paced stream, a thousand a second: 60_000 is a minute.
+/// The number of frames of the paced stream, at 1000 a second: 60_000 is a minute.
 const FRAMES: &str = "LAGER_SOAK_FRAMES";
 
 fn frames() -> u64 {
@@ -70,10 +68,10 @@ fn python() -> Command {
 }
 
 fn program(name: &str) -> PathBuf {
-    Path::new(PACKAGE).join("tests").join(name)
+    in_tree("bus/python/tests").join(name)
 }
 
-/// A Python program that is led line by line; killed when dropped.
+/// A Python program that the test controls line by line; dropping it kills the process.
 struct Led {
     child: Child,
     to: ChildStdin,
@@ -101,7 +99,7 @@ impl Led {
         writeln!(self.to, "{line}").expect("it reads");
     }
 
-    /// What it says next; the harness of a failing program says why on standard error.
+    /// The program's next line. If it fails, its standard error has the reason.
     fn says(&mut self) -> Value {
         let mut line = String::new();
         self.from.read_line(&mut line).expect("it speaks UTF-8");
@@ -116,7 +114,7 @@ impl Drop for Led {
     }
 }
 
-/// Every struct of the table, with those inside.
+/// Adds a struct of the table and all structs inside it to `found`.
 fn structs(info: StructInfo, found: &mut Vec<StructInfo>) {
     for field in info.fields {
         let mut make = field.make;
@@ -136,15 +134,15 @@ fn structs(info: StructInfo, found: &mut Vec<StructInfo>) {
 #[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
 fn python_has_rusts_sizes_and_offsets_and_finds_the_same_bus() {
     let domain = Domain::new();
-    let place = domain.bus("r1", 1.0).place().expect("the bus's folder");
-    // The second time on a bus that was cleared, which has names of its own.
+    let place = domain.bus("r1", 1.0).home().expect("the bus's folder");
+    // The second round is on a cleared bus, which gives its files other names.
     for cleared in [false, true] {
         if cleared {
             let robot = "r1".parse().expect("a name");
             std::fs::create_dir_all(place.transport_folder()).expect("a folder");
             assert!(place.clear(&robot));
         }
-        let place = domain.bus("r1", 1.0).place().expect("the bus's folder");
+        let place = domain.bus("r1", 1.0).home().expect("the bus's folder");
         let output = python()
             .arg(program("layouts.py"))
             .arg(domain.bus_folder())
@@ -162,7 +160,7 @@ fn python_has_rusts_sizes_and_offsets_and_finds_the_same_bus() {
             format!("iceoryx2 {}", theirs["iceoryx2"].as_str().unwrap()),
             BUS_VERSION
         );
-        assert_eq!(theirs["observers"], OBSERVERS);
+        assert_eq!(theirs["observers"], SensorLine::QOS.observers);
 
         let mut ours = Vec::new();
         structs(StructInfo::of::<Stamp>(), &mut ours);
@@ -201,7 +199,7 @@ fn send(publisher: &Publisher<SensorLine>, number: u64) {
     publisher.send(Cause::OWN, frame).expect("it is sent");
 }
 
-/// Publishes at a thousand a second and reads along.
+/// Publishes 1000 frames a second, and receives them here as well.
 fn stream(publisher: &Publisher<SensorLine>, beside: &mut Subscriber<SensorLine>, frames: u64) {
     let start = Instant::now();
     for number in 0..frames {
@@ -238,11 +236,11 @@ fn python_reads_what_rust_reads_and_counts_what_it_missed() {
     assert_eq!(beside.received() + beside.lost(), frames);
     assert_eq!(received + lost, frames);
     if std::env::var_os(FRAMES).is_some() {
-        // A machine that does nothing else has time for every frame, here and there.
+        // On a machine that does nothing else, both receivers get every frame.
         assert_eq!((received, beside.received()), (frames, frames));
     }
 
-    // 256 fit into its queue.
+    // 256 of them fit into its queue.
     (frames..frames + 1000).for_each(|number| send(&publisher, number));
     reader.tell("burst");
     let burst = json!({"received": received + 256, "lost": lost + 744, "last": frames + 999});
@@ -291,7 +289,7 @@ fn python_reads_a_topic_that_is_in_no_table() {
 #[test]
 #[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
 fn without_a_folder_python_finds_the_bus_that_lager_would() {
-    let usual = BusConfig::default().place().expect("this user's folder");
+    let usual = BusConfig::of(&LAGER).home().expect("this user's folder");
     let code = "from lagerrobot import _place; place = _place.find(None); \
                 print(place.folder, place.prefix, place.root, sep=chr(10))";
     let output = python().args(["-c", code]).output().expect("Python starts");
@@ -305,7 +303,7 @@ fn without_a_folder_python_finds_the_bus_that_lager_would() {
         &*root.to_string_lossy(),
     ];
     assert_eq!(found.lines().collect::<Vec<_>>(), wanted);
-    // It stays where anything is in it.
+    // This fails, and the folder stays, if there is a file in it.
     let _ = std::fs::remove_dir(usual.folder());
 }
 
@@ -347,7 +345,10 @@ fn the_package_is_typed_and_a_wrong_field_is_found() {
         let mut command = python();
         command.args(["-m", "mypy", "--strict", "--cache-dir"]);
         command.arg(domain.folder().join("mypy"));
-        command.current_dir(PACKAGE).arg("lagerrobot").arg(file);
+        command
+            .current_dir(in_tree("bus/python"))
+            .arg("lagerrobot")
+            .arg(file);
         let output = command.output().expect("mypy starts");
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
         (output.status.success(), said)
@@ -359,4 +360,21 @@ fn the_package_is_typed_and_a_wrong_field_is_found() {
         !accepted && said.contains("\"LineFrame\" has no attribute \"bite\""),
         "{said}"
     );
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with matplotlib; tests/run makes one"]
+fn what_was_measured_is_drawn() {
+    let domain = Domain::new();
+    let [report, picture] = ["hop.json", "hop.svg"].map(|name| domain.folder().join(name));
+    let row = json!({"name": "lager", "mode": "block", "regime": "plain", "what": "hop",
+        "p50_ns": 4_100, "p999_ns": 9_300});
+    let told = json!({"machine": "two cores", "rows": [row]});
+    std::fs::write(&report, told.to_string()).expect("a file");
+    let mut plot = python();
+    plot.arg(in_tree("benches/plot"));
+    let said = plot.args([&report, &picture]).output().expect("it starts");
+    let said = String::from_utf8_lossy(&said.stderr);
+    let drawn = std::fs::read_to_string(picture).unwrap_or_else(|_| panic!("{said}"));
+    assert!(drawn.contains("</svg>"), "{said}");
 }

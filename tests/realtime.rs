@@ -1,8 +1,8 @@
-//! Real time as the kernel sees it: what `/proc` says of the services that `up` starts and of their
-//! successors after `kill -9`, and what users without the rights are told.
+//! Tests of real-time scheduling: what `/proc` says of the services that `up` starts and of their
+//! successors after `kill -9`, and what `lager` tells a user who has no right to real time.
 //!
-//! What needs those rights, or a kernel that has time slices, is ignored, unless it is asked for as
-//! `tests/run` does where it has them; then it fails without them.
+//! Tests that need this right, or a kernel with time slices, are ignored by default. `tests/run`
+//! runs them where the machine has both; run elsewhere, they fail.
 
 use std::fs;
 use std::path::Path;
@@ -12,14 +12,14 @@ use lager_tests::{Domain, Running, pid, wait_for};
 use rustix::process::{Resource, Signal, getrlimit, kill_process};
 use rustix::thread::{CapabilitySet, capabilities};
 
-/// The documented exit code of what is not granted.
+/// The documented exit code when the kernel does not grant what was asked.
 const NOT_GRANTED: Option<i32> = Some(5);
 
-/// What the kernel numbers `SCHED_OTHER` and `SCHED_FIFO`.
+/// The kernel's numbers of `SCHED_OTHER` and `SCHED_FIFO`.
 const OTHER: u32 = 0;
 const FIFO: u32 = 1;
 
-/// How a thread is scheduled.
+/// The scheduling of one thread.
 #[derive(Debug, PartialEq, Eq)]
 struct Scheduled {
     name: String,
@@ -28,7 +28,7 @@ struct Scheduled {
     cores: String,
 }
 
-/// Every thread of a process; empty when it is gone.
+/// Every thread of a process; empty when the process has ended.
 fn threads(process: u32) -> Vec<Scheduled> {
     fs::read_dir(format!("/proc/{process}/task"))
         .into_iter()
@@ -36,8 +36,8 @@ fn threads(process: u32) -> Vec<Scheduled> {
         .filter_map(|task| {
             let task = task.ok()?.path();
             let stat = fs::read_to_string(task.join("stat")).ok()?;
-            // The name before it is in parentheses and may contain anything; proc(5) counts from
-            // 1, and the state that follows the name is field 3.
+            // The name before it is in parentheses and may contain any character. proc(5) counts
+            // fields from 1, and the state, which follows the name, is field 3.
             let fields: Vec<&str> = stat.rsplit(") ").next()?.split_whitespace().collect();
             let field = |number: usize| fields[number - 3].parse().ok();
             Some(Scheduled {
@@ -56,8 +56,8 @@ fn name_of(task: &Path) -> Option<String> {
     Some(name.trim_end().to_owned())
 }
 
-/// How many steps a thread of a service stands behind the bridge's main loop: who is farther along
-/// the path goes first.
+/// How many steps less urgent than the bridge's main loop a thread of a service is. The farther
+/// along the path a thread is, the more urgent it is.
 fn behind(service: &str, name: &str) -> u32 {
     match (service, name) {
         ("bridge", "sensor-port" | "steering-port") => 2,
@@ -73,7 +73,7 @@ fn status(process: &Path, name: &str) -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// How many mappings of the bus a process has, and how many of them are locked.
+/// The number of a process's mappings of the bus, and how many of them are locked in memory.
 fn bus_mappings(process: u32) -> (usize, usize) {
     let smaps = fs::read_to_string(format!("/proc/{process}/smaps")).unwrap_or_default();
     let mut counts = (0, 0);
@@ -85,7 +85,7 @@ fn bus_mappings(process: u32) -> (usize, usize) {
                 counts.1 += usize::from(flags.split_whitespace().any(|flag| flag == "lo"));
             }
             Some(_) => {}
-            // A mapping's first line begins with its addresses, each further one with a name.
+            // The first line of a mapping begins with its addresses, each further one with a name.
             None if line
                 .split(' ')
                 .next()
@@ -99,7 +99,7 @@ fn bus_mappings(process: u32) -> (usize, usize) {
     counts
 }
 
-/// The first and the last core of this process: the same one on a machine with one.
+/// The first and the last core that this process may use; one core twice if it has only one.
 fn two_cores() -> [String; 2] {
     let list = status(Path::new("/proc/self"), "Cpus_allowed_list").expect("cores");
     let end = |pick: fn(&str) -> Option<&str>| pick(&list).expect("a core").to_owned();
@@ -109,7 +109,7 @@ fn two_cores() -> [String; 2] {
     ]
 }
 
-/// Fails unless whoever runs this may use a priority of 20 and lock as much memory as he likes.
+/// Fails unless the user may set priority 20 and lock any amount of memory.
 fn need_real_time() {
     let effective = capabilities(None).expect("the kernel says").effective;
     let unlimited = |resource, wanted| {
@@ -125,7 +125,7 @@ fn need_real_time() {
     );
 }
 
-/// The same command for a user without the rights, whoever runs this.
+/// The same command for a user without these rights, whoever runs the test.
 fn without_rights(command: &Command) -> Command {
     let mut poor;
     if rustix::process::geteuid().is_root() {
@@ -145,7 +145,7 @@ fn without_rights(command: &Command) -> Command {
     poor
 }
 
-/// Runs `lager` with `args` as a user without the rights.
+/// Runs `lager` with `args` as a user without these rights.
 fn run_without_rights(domain: &Domain, args: &[&str]) -> Output {
     without_rights(&domain.lager(args))
         .output()
@@ -156,9 +156,9 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Waits until `service` is a process with all its threads on the bus, other than `before`.
+/// Waits until `service` has a new process, other than `before`, with all its threads on the bus.
 fn at_work(up: &Running, service: &str, before: Option<u32>) -> u32 {
-    // The bridge has a thread for each port and every child the one that ends it for certain.
+    // The bridge has two threads for its ports; every child has one that surely ends it.
     let wanted = if service == "bridge" { 4 } else { 2 };
     wait_for(service, || {
         up.service(service)
@@ -191,7 +191,7 @@ fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
         for (place, (service, core)) in cores.iter().enumerate() {
             let process = at_work(&up, service, before[place]);
             before[place] = Some(process);
-            // A new thread takes its place first of all.
+            // A new thread first sets its own scheduling, so this takes a moment.
             wait_for("each thread in its place", || {
                 let all = threads(process);
                 let is_placed = |thread: &Scheduled| {
@@ -211,7 +211,7 @@ fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
                 .next()
                 .and_then(|kib| kib.parse().ok())
                 .expect("a size in kB");
-            // At most what people are told to allow.
+            // Not more than the limit that the documentation tells people to allow.
             assert!(
                 (1..=64 << 10).contains(&kib),
                 "{service} in life {life}: {locked}"
@@ -223,7 +223,7 @@ fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
             }
         }
     }
-    // What starts the services is no part of the path, nor is what stands for the boards.
+    // Neither the supervisor nor the simulator, which replaces the boards, is part of the path.
     let simulator = up.service("simulator").expect("a simulated robot");
     for process in [up.pid(), simulator] {
         let all = threads(process);
@@ -275,7 +275,7 @@ fn a_service_on_its_own_takes_the_same_flags() {
     domain.assert_clean();
 }
 
-/// The name and the time slice, in ns, of each thread of a process; none when it is gone.
+/// The name and the time slice, in ns, of each thread of a process; empty when it has ended.
 fn slices(process: u32) -> Vec<(String, u64)> {
     let slice = |task: std::io::Result<fs::DirEntry>| {
         let task = task.ok()?.path();
@@ -364,7 +364,7 @@ fn cores_that_are_not_there_and_spinning_on_all_of_them_are_refused() {
     for (args, word) in [
         (&["up", "--core", "1000"][..], "no core 1000"),
         (&["simulator", "--core", "1000"], "no core 1000"),
-        // Two that never sleep on one core: too many for it, on any machine.
+        // Two threads that never sleep on one core: too many on any machine.
         (
             &["--config", spin, "up", "--realtime", "20", "--core", &first],
             "adaptive",
@@ -393,7 +393,7 @@ fn the_doctor_tries_what_was_asked_for_and_does_not_guess() {
         assert!(text.lines().any(bad), "{what}: {text}");
         assert!(text.contains(cure), "{what}: {text}");
     }
-    // Nobody has to have rights that he does not use.
+    // A user without these rights needs none for a robot that is not in real time.
     let poor = run_without_rights(&domain, &["doctor"]);
     let text = String::from_utf8_lossy(&poor.stdout).into_owned();
     assert_eq!(poor.status.code(), Some(0), "{text}");

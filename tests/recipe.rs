@@ -1,15 +1,15 @@
-//! `firmware/avr/build` on a machine that lacks what it needs: it says so and installs nothing.
+//! Tests that `firmware/avr/build`, on a machine that lacks a tool, says so and installs nothing.
 
 use std::fs;
 use std::os::unix::fs::symlink;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Programs that every machine has and the recipe uses before it looks for anything.
+/// Programs that every machine has, and that the script uses before it looks for its tools.
 const ORDINARY: [&str; 4] = ["bash", "dirname", "awk", "env"];
 
-/// A folder of links to the ordinary programs, and nothing else.
+/// A folder with links to these ordinary programs and nothing else.
 struct Bare(PathBuf);
 
 impl Bare {
@@ -29,8 +29,7 @@ impl Bare {
     }
 
     fn build(&self, arguments: &[&str]) -> Output {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-        Command::new(root.join("firmware/avr/build"))
+        Command::new(lager_tests::in_tree("firmware/avr/build"))
             .args(arguments)
             .env("PATH", &self.0)
             .output()

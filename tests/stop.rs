@@ -1,21 +1,24 @@
-//! `lager stop` when the bus cannot help: every place on it is taken, the bridge frozen, the bus's
-//! files gone, the disk full, everything killed. Real processes, and a robot that drives at full
-//! speed behind two ptys. As with real boards it starts stopped and in manual mode.
+//! Tests that `lager stop` stops the robot although the bus cannot help: the bus has no place left,
+//! the bridge is frozen, the bus's files are gone, the disk is full, or everything was killed. The
+//! processes are real, and the robot drives at full speed behind two ptys. Like one with real
+//! boards, it begins stopped and in manual mode.
 
 use std::fs;
 use std::path::PathBuf;
 use std::process::Output;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, Clock, StopPage, StopWord, Subscriber};
+use lager_home::Clock;
+use lager_ports::{Bus, Subscriber};
+use lager_stop::{StopPage, StopWord};
 use lager_tests::{Domain, Running, has_ended, is_stopped, pid, wait_for};
 use lager_topics::{LinkHealth, Role, SensorLine, TruthPose};
 use rustix::process::{Signal, kill_process};
 
-/// How long the motors are watched after a stop.
+/// How long the test watches the motors after a stop.
 const WATCHED: Duration = Duration::from_millis(400);
 
-/// A robot behind its ports, its services, and whoever drives it.
+/// A robot behind its ports, its services, and the processes that drive it.
 struct Scene {
     drives: Vec<Running>,
     up: Option<Running>,
@@ -26,7 +29,7 @@ struct Scene {
 }
 
 impl Scene {
-    /// A robot whose wheels turn at full speed, with so many people who drive it.
+    /// A robot whose wheels turn at full speed while `people` processes give it orders.
     fn driving(people: usize) -> Self {
         let domain = Domain::new();
         let [sensor, steering] =
@@ -74,13 +77,13 @@ impl Scene {
         if people == 0 {
             return;
         }
-        // The others' orders are given too.
+        // So that the other processes give their orders, too.
         std::thread::sleep(Duration::from_millis(if people > 1 { 500 } else { 0 }));
         self.wait_to_move();
     }
 
-    /// Waits until the wheels turn. Whoever drives and was held up for longer than his order lasts
-    /// has ended with a sentence, and drives anew.
+    /// Waits until the wheels turn. If others keep a driving process from its core for longer than
+    /// its order lasts, it ends with a sentence, and a new one is started.
     fn wait_to_move(&mut self) {
         wait_for("the wheels to turn", || {
             let last = self.drives.last_mut().expect("somebody drives");
@@ -91,7 +94,7 @@ impl Scene {
         });
     }
 
-    /// The duties at the motors, as the world has them now.
+    /// The newest duties of the motors in the simulated world.
     fn duties(&mut self) -> Option<[u8; 2]> {
         let truth = self.truth.latest().expect("readable")?;
         Some([truth.left_duty, truth.right_duty])
@@ -103,7 +106,7 @@ impl Scene {
         (output, start.elapsed())
     }
 
-    /// Stops and finds that what is said is so.
+    /// Runs `lager stop`, and checks that its answer is true.
     fn assert_stops(&mut self, case: &str) {
         let (output, took) = self.stop();
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -114,7 +117,7 @@ impl Scene {
         self.assert_stands(case);
     }
 
-    /// Whatever is renewed, nothing turns any more.
+    /// Asserts that the wheels stand although the orders are renewed.
     fn assert_stands(&mut self, case: &str) {
         while self.truth.receive().expect("readable").is_some() {}
         let end = Clock::monotonic_ns() + u64::try_from(WATCHED.as_nanos()).expect("short");
@@ -135,8 +138,8 @@ impl Scene {
 
     fn word(&self) -> PathBuf {
         let bus = self.domain.bus("r1", 1.0);
-        let place = bus.place().expect("a place");
-        place.folder_of(&bus.robot).join(StopPage::FILE)
+        let place = bus.home().expect("a place");
+        place.folder_of(&bus.unit).join(StopPage::FILE)
     }
 
     fn end(self) {
@@ -158,7 +161,7 @@ fn it_stops_when_people_have_taken_every_writers_place() {
 #[test]
 fn it_stops_when_readers_have_taken_every_place() {
     let mut scene = Scene::driving(1);
-    // As many as there are places, in whatever role: the 65th observer would be refused.
+    // As many observers as the bus has places, in any role: it would refuse the 65th.
     let bus = |role| Bus::open(&scene.domain.bus("r1", 1.0), role).expect("the bus opens");
     let buses = [bus(Role::Observer), bus(Role::Comm), bus(Role::Station)];
     let mut health = Vec::new();
@@ -181,7 +184,7 @@ fn it_stops_when_readers_have_taken_every_place() {
 fn a_frozen_bridge_is_named_and_stops_the_robot_when_it_goes_on() {
     let mut scene = Scene::driving(1);
     let bridge = scene.bridge();
-    // The supervisor as well: it would replace the bridge within the time that a stop has.
+    // Freezes the supervisor too: it would replace the bridge before the stop's time is over.
     let up = scene.up.as_ref().expect("it is up").pid();
     for process in [up, bridge] {
         kill_process(pid(process), Signal::STOP).expect("a living process");
@@ -203,14 +206,14 @@ fn a_frozen_bridge_is_named_and_stops_the_robot_when_it_goes_on() {
 #[test]
 fn it_stops_when_the_bus_folder_is_emptied() {
     let mut scene = Scene::driving(1);
-    let place = scene.domain.bus("r1", 1.0).place().expect("a place");
+    let place = scene.domain.bus("r1", 1.0).home().expect("a place");
     for entry in fs::read_dir(place.folder()).expect("a folder").flatten() {
         let _ = match entry.path().is_dir() {
             true => fs::remove_dir_all(entry.path()),
             false => fs::remove_file(entry.path()),
         };
     }
-    // The stop must come before any command: an emptied folder is a reason of its own.
+    // An emptied folder is a reason to stop: the bridge does so before any command comes.
     let set = wait_for("the stop word to be there again", || {
         StopWord::read(&scene.word()).ok()??.stop()
     });
@@ -234,7 +237,7 @@ fn it_stops_when_the_bus_folder_is_emptied() {
 #[test]
 fn it_stops_when_the_disk_of_temporary_files_is_full() {
     let mut scene = Scene::driving(1);
-    // A /tmp of its own that is full. The program may lie below the one that is hidden by it.
+    // A separate, full /tmp. It may hide the program, so descriptor 9 keeps the program open.
     let full = "exec 9<\"$1\"; shift; mount -t tmpfs -o size=4k none /tmp || exit 99; \
                 head -c 9000 /dev/zero >/tmp/full 2>/dev/null; exec /proc/self/fd/9 \"$@\"";
     let start = Instant::now();
@@ -284,7 +287,7 @@ fn it_stays_stopped_when_everything_is_killed_and_started_again() {
         (said.contains("STOPPED by a `lager` command") && said.contains("lager resume"))
             .then_some(())
     });
-    // A clean end keeps it as well.
+    // The stop also outlives a robot that ends in order.
     drop(scene.up.take());
     let told = StopWord::read(&scene.word())
         .expect("readable")
@@ -298,7 +301,7 @@ fn a_stop_word_cut_short_under_the_bridge_stops_the_robot() {
     let mut scene = Scene::driving(1);
     let file = fs::OpenOptions::new().write(true).open(scene.word());
     file.expect("a file").set_len(0).expect("a shorter file");
-    // Either the bridge mends it or it dies of it and its successor does.
+    // Either the bridge mends the word, or the bridge ends and its successor mends it.
     let stop = wait_for("the robot to be stopped", || {
         StopWord::read(&scene.word()).ok()??.stop()
     });

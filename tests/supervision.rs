@@ -1,5 +1,6 @@
-//! What `lager up` survives: the bus is damaged, emptied, cut off or silent while the robot runs.
-//! The robot comes up again by itself, or ends with a sentence, and Ctrl-C always ends it.
+//! Tests that `lager up` survives a damaged bus: its files are overwritten, removed or cut short,
+//! or a process on it is silent. The robot comes up again by itself or ends with a sentence, and
+//! Ctrl-C always ends it.
 
 use std::fs::{self, File};
 use std::io::Read as _;
@@ -26,7 +27,7 @@ const MISSION: [&str; 8] = [
     "3",
 ];
 
-/// The process of a service, once there is one that is not `before`.
+/// The process of a service; waits until there is one other than `before`.
 fn service(up: &mut Running, name: &str, before: Option<u32>) -> u32 {
     wait_for(name, || {
         assert!(up.is_running(), "{}{}", up.log(), up.output());
@@ -34,13 +35,13 @@ fn service(up: &mut Running, name: &str, before: Option<u32>) -> u32 {
     })
 }
 
-/// Waits until a newcomer to the bus hears the bridge that runs, with both boards.
+/// Waits until a process that joins the bus now hears a bridge with both boards connected.
 fn wait_until_up(domain: &Domain, up: &mut Running) {
     wait_for("the robot to be up", || {
         assert!(up.is_running(), "{}{}", up.log(), up.output());
         let echo = ["topic", "echo", "link/health", "--count", "1", "--json"];
         let mut echo = domain.start(&echo);
-        // It may hang where the bus is damaged, or wait on one that is no more.
+        // This process may hang on a damaged bus, or wait on a bus that was replaced.
         let give_up = Instant::now() + Duration::from_secs(2);
         while echo.is_running() && Instant::now() < give_up {
             std::thread::sleep(Duration::from_millis(5));
@@ -57,7 +58,7 @@ fn wait_until_up(domain: &Domain, up: &mut Running) {
     });
 }
 
-/// Starts a robot on which every service is at work.
+/// Starts a robot, and waits until every service is at work.
 fn start(domain: &Domain, args: &[&str]) -> Running {
     let mut up = domain.start(args);
     wait_until_up(domain, &mut up);
@@ -65,8 +66,8 @@ fn start(domain: &Domain, args: &[&str]) -> Running {
     up
 }
 
-/// Ends a robot by Ctrl-C. One that was started again in the middle of its mission has not
-/// delivered it.
+/// Ends a robot by Ctrl-C; `code` is the expected exit code. A robot that was started again in the
+/// middle of its mission has not delivered it.
 fn interrupt(up: &mut Running, code: i32) {
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(code), "{}{}", up.log(), up.output());
@@ -76,7 +77,7 @@ fn kill(process: u32, signal: Signal) {
     kill_process(pid(process), signal).expect("a living process");
 }
 
-/// A robot that was started again on a cleared bus moves nothing until somebody says where it is.
+/// A robot that was started again on a cleared bus stands until a person says where it is.
 fn assert_stands_lost(domain: &Domain, cause: StopCause) {
     let observer = domain.observe("r1", 1.0);
     let mut health: Subscriber<LinkHealth> = observer.subscriber().expect("a topic");
@@ -88,8 +89,7 @@ fn assert_stands_lost(domain: &Domain, cause: StopCause) {
     assert_eq!(status.phase, Phase::Lost, "{status:?}");
 }
 
-/// What a robot leaves that was started again on a cleared bus: a stop, as nobody knows where it
-/// is.
+/// Such a robot leaves nothing but a stop, because nobody knows where it is.
 fn assert_only_a_stop_is_left(domain: &Domain) {
     let mut left = domain.leftovers();
     left.retain(|file| !file.ends_with("/r1/stop"));
@@ -97,13 +97,13 @@ fn assert_only_a_stop_is_left(domain: &Domain) {
 }
 
 fn segments(domain: &Domain) -> Vec<PathBuf> {
-    domain.bus("r1", 1.0).place().expect("a folder").segments()
+    domain.bus("r1", 1.0).home().expect("a folder").segments()
 }
 
-/// Cuts the shared memory of a bus off; a process that looks at its own gets SIGBUS.
+/// Cuts the shared memory of a bus to length 0; a process that reads its mapping gets SIGBUS.
 fn cut_off(domain: &Domain) {
     for segment in segments(domain) {
-        // One may be removed in the middle of it.
+        // Another process may remove a segment meanwhile.
         if let Ok(file) = File::options().write(true).open(segment) {
             let _ = file.set_len(0);
         }
@@ -131,7 +131,7 @@ fn a_bridge_comes_back_on_a_bus_with_a_segment_that_was_never_finished() {
     service(&mut up, "bridge", Some(bridge));
     wait_until_up(&domain, &mut up);
     up.signal(Signal::INT);
-    // Whoever has swept the segment first has saved the mission.
+    // 0 if a process removed the unfinished file in time for the mission to be delivered.
     let code = up.wait();
     assert!(
         matches!(code, Some(0 | 3)),
@@ -145,15 +145,15 @@ fn a_bridge_comes_back_on_a_bus_with_a_segment_that_was_never_finished() {
 fn a_robot_comes_up_again_on_an_emptied_bus() {
     let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
-    // A bus that was cleared has names of its own.
+    // A cleared bus gives its files other names.
     for (emptied, next, cause) in [
         ("iceoryx2", "iceoryx2-1", StopCause::StateLost),
-        // The bridge notices it first, and stops.
+        // The bridge notices it first, and stops the robot.
         ("r1", "r1", StopCause::WordRemoved),
     ] {
         let folder = domain.bus_folder().join(emptied);
         let attendant = service(&mut up, "attend", None);
-        // The robot makes files in it meanwhile.
+        // The robot makes new files in the folder meanwhile.
         wait_for("the folder to be emptied", || {
             fs::remove_dir_all(&folder).ok()
         });
@@ -181,10 +181,11 @@ fn a_robot_comes_up_again_when_its_memory_is_cut_off() {
     assert_only_a_stop_is_left(&domain);
 }
 
-/// What the lists of ends of a robot's topics are, as far as `others` have none of them in use.
+/// The segments with the lists of publishers and subscribers that `robot` has mapped and `others`
+/// have not.
 fn own_topics(domain: &Domain, robot: &[u32], others: &[u32]) -> Vec<PathBuf> {
     let maps = |process: &u32| {
-        // One that has ended has nothing mapped.
+        // A process that has ended has no mappings.
         fs::read_to_string(format!("/proc/{process}/maps")).unwrap_or_default()
     };
     let of = |processes: &[u32]| processes.iter().map(maps).collect::<String>();
@@ -245,8 +246,8 @@ fn a_robot_whose_topics_are_overwritten_comes_up_again_beside_another_that_notic
     assert_only_a_stop_is_left(&domain);
 }
 
-/// It starts the robot again after pauses that grow, says so, and goes on when what damages the bus
-/// has ended.
+/// The supervisor starts the robot again after growing pauses and says so. It succeeds when the
+/// program that damages the bus has ended.
 #[test]
 fn a_bus_that_does_not_hold_is_tried_more_and_more_seldom_until_it_does() {
     let domain = Domain::new();
@@ -283,7 +284,7 @@ fn a_mission_is_delivered_though_its_attendant_is_killed_again_and_again() {
     let mut killed = 0;
     let mut attendant = None;
     while up.is_running() {
-        // Each meets the mission in another place: the arm's work is a third of it.
+        // Each kill comes at another point of the mission, a third of which is work of the arm.
         std::thread::sleep(Duration::from_millis(600 + killed * 70));
         let Some(next) = up.service("attend").filter(|next| Some(*next) != attendant) else {
             continue;
@@ -298,7 +299,7 @@ fn a_mission_is_delivered_though_its_attendant_is_killed_again_and_again() {
     assert!(killed > 3, "{killed} kills");
     assert_eq!(told["delivered"], json!([1]), "{told}");
     let restarts = told["restarts"].as_u64().expect("restarts");
-    // The last one may have met the end.
+    // The last kill may have come when the mission was just over.
     assert!(
         restarts == killed || restarts + 1 == killed,
         "{told}\n{}",
@@ -347,7 +348,7 @@ fn a_stopped_service_is_replaced_by_itself() {
     domain.assert_clean();
 }
 
-/// `strace` keeps a call of it from returning.
+/// `strace` keeps one of its system calls from returning.
 #[test]
 fn a_comm_that_hangs_ends_itself_with_a_sentence() {
     let domain = Domain::new();
@@ -380,7 +381,7 @@ fn a_comm_that_hangs_ends_itself_with_a_sentence() {
     domain.assert_clean();
 }
 
-/// Comm says nothing on the bus and the station is on none: each writes signs of life.
+/// Comm writes nothing on the bus, and the station uses none, so each writes signs of life.
 #[test]
 fn a_stopped_comm_and_a_stopped_station_are_replaced_by_themselves() {
     let domain = Domain::new();
@@ -396,8 +397,8 @@ fn a_stopped_comm_and_a_stopped_station_are_replaced_by_themselves() {
         let stopped = service(&mut up, name, None);
         wait_for("its sign of life", || {
             let bus = domain.bus("r1", 1.0);
-            let place = bus.place().expect("a folder");
-            let sign = place.sign_of(&bus.robot, name)?;
+            let place = bus.home().expect("a folder");
+            let sign = place.sign_of(&bus.unit, name)?;
             (sign.pid == stopped).then_some(())
         });
         kill(stopped, Signal::STOP);
@@ -412,7 +413,7 @@ fn a_stopped_comm_and_a_stopped_station_are_replaced_by_themselves() {
     domain.assert_clean();
 }
 
-/// Nobody supervises this comm, so it stays frozen for as long as `top` looks.
+/// Nobody supervises this comm, so it stays frozen while `top` looks at it.
 #[test]
 fn top_does_not_say_that_all_is_well_while_a_service_is_frozen() {
     let domain = Domain::new();
@@ -441,7 +442,7 @@ fn top_does_not_say_that_all_is_well_while_a_service_is_frozen() {
     domain.assert_clean();
 }
 
-/// Busy loops, twelve of them, which end when this is dropped.
+/// Twelve busy loops; dropping this ends them.
 struct Busy(Vec<std::process::Child>);
 
 impl Busy {
@@ -458,7 +459,7 @@ impl Busy {
 impl Drop for Busy {
     fn drop(&mut self) {
         for shell in &mut self.0 {
-            // `timeout` ends its child, too.
+            // `timeout` ends the loop that it has started.
             let _ = kill_process(pid(shell.id()), Signal::TERM);
             let _ = shell.wait();
         }
@@ -472,7 +473,7 @@ fn on_a_busy_machine_nothing_is_called_damaged_and_the_mission_is_carried_out() 
     let busy = Busy::begin();
     let args = ["up", "--headless", "--no-station", "--mission", "1"];
     let drives = |up: &Running| up.output().contains("drives from").then_some(());
-    // All of its processes are killed at once, and it is started again.
+    // The test kills all processes of the robot at once, and starts the robot again.
     for _ in 0..2 {
         let mut up = domain.start(&args);
         wait_for("the robot to drive", || drives(&up));
@@ -490,7 +491,7 @@ fn on_a_busy_machine_nothing_is_called_damaged_and_the_mission_is_carried_out() 
         std::thread::sleep(Duration::from_millis(100));
     }
     drop(busy);
-    // It goes on by itself when the load ends.
+    // When the load ends, the robot goes on by itself.
     wait_for("the delivery", || {
         assert!(up.is_running(), "{}{}", up.log(), up.output());
         was_delivered(&up).then_some(())
@@ -521,7 +522,7 @@ fn a_second_ctrl_c_ends_what_does_not_stop() {
         kill(*process, Signal::STOP);
     }
     up.signal(Signal::INT);
-    // Sooner it would be the same press.
+    // Two presses with a shorter pause would count as one.
     std::thread::sleep(Duration::from_millis(400));
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(0), "{}{}", up.log(), up.output());

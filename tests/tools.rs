@@ -1,4 +1,4 @@
-//! The tools as people meet them: what they say, how they end, and that none of them hangs.
+//! Tests of the tools as people use them: their messages, their exit codes, and that none hangs.
 
 use std::fs;
 use std::process::{Child, Command, Output, Stdio};
@@ -9,7 +9,7 @@ use lager_topics::{LinkHealth, NavStatus, Phase, SensorLine};
 use rustix::process::{Signal, kill_process};
 use serde_json::Value;
 
-/// Every tool that needs the bus of a robot that is up.
+/// Every tool that needs the bus of a running robot.
 const NEEDY: [&[&str]; 26] = [
     &["topic", "echo", "sensor/line"],
     &["topic", "echo", "link/health", "--json"],
@@ -39,10 +39,10 @@ const NEEDY: [&[&str]; 26] = [
     &["topic", "list"],
 ];
 
-/// So many of them run at once.
+/// How many of them run at the same time.
 const SOME: usize = 7;
 
-/// A tool is to end within 3 s. A machine that is busy with other things is given more.
+/// Every tool should end within 3 s; this limit is longer, for a busy machine.
 const LONG: Duration = Duration::from_secs(20);
 
 fn text(bytes: &[u8]) -> String {
@@ -65,8 +65,8 @@ fn up(domain: &Domain) -> Running {
     up
 }
 
-/// A robot whose processes are all frozen and whose topics nobody can open any more: what stands
-/// in shared memory of them has no size, as if its maker had been stopped before he gave it one.
+/// A robot whose processes are all frozen, and whose topics nobody can open: their files in shared
+/// memory have the size 0, as if their maker had been stopped before it set the size.
 struct Frozen {
     processes: Vec<u32>,
     _up: Running,
@@ -93,9 +93,9 @@ impl Frozen {
     }
 }
 
-/// Takes the size of what stands in shared memory of every topic and request.
+/// Cuts the shared memory of every topic and request to size 0.
 fn cut(domain: &Domain) {
-    let place = domain.bus("r1", 2.0).place().expect("the bus's folder");
+    let place = domain.bus("r1", 2.0).home().expect("the bus's folder");
     let mut cut = 0;
     for segment in place.segments() {
         if segment.to_string_lossy().ends_with(".dynamic") {
@@ -108,7 +108,7 @@ fn cut(domain: &Domain) {
 }
 
 impl Drop for Frozen {
-    /// They would find their memory gone, and could not be ended in order.
+    /// The processes would find their memory gone and could not end in order, so they are killed.
     fn drop(&mut self) {
         for process in &self.processes {
             let _ = kill_process(pid(*process), Signal::KILL);
@@ -128,7 +128,7 @@ fn spawn(domain: &Domain, words: &[&str]) -> Child {
         .expect("lager starts")
 }
 
-/// Waits for the end of a tool that is not to take long.
+/// Waits until a tool ends, which must not take long.
 fn end(words: &[&str], mut tool: Child, began: Instant) -> Output {
     while tool.try_wait().expect("a child").is_none() {
         if began.elapsed() >= LONG {
@@ -144,7 +144,7 @@ fn end(words: &[&str], mut tool: Child, began: Instant) -> Output {
 fn no_tool_hangs_on_a_bus_that_does_not_answer() {
     let domain = Domain::new();
     let frozen = Frozen::new(&domain);
-    // Some at a time: the machine has few cores, and what hangs in the transport takes one.
+    // A few at a time: the machine has few cores, and a tool that hangs in the transport uses one.
     for some in NEEDY.chunks(SOME) {
         let tools: Vec<_> = some
             .iter()
@@ -153,7 +153,7 @@ fn no_tool_hangs_on_a_bus_that_does_not_answer() {
         for (words, tool, began) in tools {
             let output = end(words, tool, began);
             let told = said(&output);
-            // Those two tell what they find, and need nobody's answer.
+            // These two tools report what they find, and wait for no answer.
             if !matches!(words, ["topic", "list" | "info", ..]) {
                 assert_eq!(output.status.code(), Some(1), "{words:?}: {told}");
                 assert!(told.contains("is frozen"), "{words:?}: {told}");
@@ -170,7 +170,7 @@ fn one_ctrl_c_ends_every_tool_also_while_the_bus_does_not_answer() {
     let frozen = Frozen::new(&domain);
     for some in NEEDY.chunks(SOME) {
         let tools: Vec<_> = some.iter().map(|words| spawn(&domain, words)).collect();
-        // They listen to signals once they have their watch; before that any signal ends them.
+        // A tool handles signals once its watch has started; before that any signal ends it.
         std::thread::sleep(Duration::from_millis(400));
         for (words, mut tool) in some.iter().zip(tools) {
             let began = Instant::now();
@@ -216,6 +216,7 @@ fn ctrl_c_ends_what_needs_no_bus() {
 
 #[test]
 fn ctrl_c_ends_a_measurement_and_leaves_nothing() {
+    lager_tests::lager_bench();
     let domain = Domain::new();
     let stop = ["bench", "stop"];
     let tool = spawn(&domain, &stop);
@@ -277,7 +278,7 @@ fn a_frozen_service_is_told_by_its_name() {
     let up = up(&domain);
     for service in ["bridge", "logic"] {
         let process = up.service(service).expect("a service");
-        // The supervisor as well: it would replace one that is silent for two seconds.
+        // Freezes the supervisor too: it would replace a process that is silent for 2 s.
         let frozen = [up.pid(), process];
         for process in frozen {
             kill_process(pid(process), Signal::STOP).expect("a living process");
@@ -322,12 +323,12 @@ fn a_calibration_tells_how_it_went() {
     let _up = up(&domain);
     let manual = domain.run(&["mode", "manual"]);
     assert!(manual.status.success(), "{}", said(&manual));
-    // A robot that stands shows its sensors tape or floor, not both.
+    // The sensors of a standing robot see either tape or floor, not both.
     let standing = domain.run(&["calibrate"]);
     let told = said(&standing);
     assert_eq!(standing.status.code(), Some(1), "{told}");
     assert!(told.contains("of the 11 line sensors have seen"), "{told}");
-    // One that turns on the spot moves most of them across the line in that time, or all.
+    // A robot that turns on the spot moves most or all sensors across the line in that time.
     let moving = domain.start(&["drive", "left", "--seconds", "20"]);
     let turning = domain.run(&["calibrate"]);
     let told = said(&turning);
@@ -348,7 +349,7 @@ fn what_is_short_is_named() {
     let domain = Domain::new();
     let _up = up(&domain);
     let tool = domain.lager(&["topic", "echo", "sensor/line", "--count", "1"]);
-    // Too few for the bus, and for the topic. With 12, one more may have been closed in time.
+    // Too few for the bus, or for the topic. With 12, an earlier file may have been closed in time.
     for files in [5, 7, 9] {
         let mut poor = Command::new("sh");
         poor.args(["-c", &format!("ulimit -n {files}; exec \"$0\" \"$@\"")])
@@ -363,8 +364,8 @@ fn what_is_short_is_named() {
     }
 }
 
-/// What `topic list` says and how it ends where `mounts`, a script, has made `/dev/shm` anew; the
-/// bus is in `/dev/shm/bus`.
+/// The output and the exit code of `topic list` after the script `mounts` has mounted another
+/// `/dev/shm`. The bus is in `/dev/shm/bus`.
 fn listed_where(domain: &Domain, mounts: &str, user: &[&str]) -> Output {
     let script = format!("{mounts}\ncp \"$0\" program\nexec \"$@\"");
     let program = domain.lager(&[]);
@@ -406,6 +407,7 @@ fn a_full_memory_and_a_missing_right_are_told_with_file_and_cause() {
 
 #[test]
 fn wrong_usage_ends_with_two_and_a_sentence() {
+    lager_tests::lager_bench();
     let domain = Domain::new();
     for (words, sentence) in [
         (&["up", "--mission", "99"][..], "no product 99"),
@@ -421,7 +423,7 @@ fn wrong_usage_ends_with_two_and_a_sentence() {
         assert_eq!(output.status.code(), Some(2), "{words:?}: {told}");
         assert!(told.contains(sentence), "{words:?}: {told}");
     }
-    // What `up` refuses is no configuration to go by.
+    // `config` refuses a configuration that `up` refuses.
     fs::write(
         domain.folder().join("lager.toml"),
         "warehouse = \"nowhere\"\n",
@@ -533,7 +535,7 @@ fn traces_of_a_mission_are_few_and_have_their_spans() {
         .lines()
         .map(|line| serde_json::from_str(line).expect("a line is a JSON value"))
         .collect();
-    // What is told goes with what happens: processes, links, orders. Not with frames.
+    // The log grows with events (processes, links, orders) and not with frames.
     let told = traces
         .iter()
         .filter(|trace| trace["level"] == "INFO")
@@ -548,7 +550,7 @@ fn traces_of_a_mission_are_few_and_have_their_spans() {
     for span in ["service", "start", "link"] {
         assert!(!begun(span).is_empty(), "no span `{span}`: {traces:#?}");
     }
-    // The station may hand the second order over when the first one is done.
+    // The station may hand over the second order when the robot has done the first one.
     assert!((1..=2).contains(&begun("mission").len()), "{traces:#?}");
     let orders = begun("order");
     let products: Vec<_> = orders

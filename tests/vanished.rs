@@ -1,15 +1,15 @@
-//! A machine that vanishes: it says nothing more, and nobody says for it that it has gone, as when
-//! a cable is pulled or a battery is empty.
+//! Tests with a machine that vanishes from the network without a word, as when somebody pulls a
+//! cable or a battery is empty.
 //!
 //! ```text
 //!   a network of the test's own              another one
 //!   lager up, or a station  ── 192.0.2.0/30 ──  sockets of the test
-//!                                            its end is taken down
+//!                                            the test takes this end down
 //! ```
 //!
-//! Both networks are in a user namespace in which each test runs itself again, so nothing of the
-//! machine's own is touched. Not every machine allows that, so they are ignored unless they are
-//! asked for, as `tests/run` does where it is allowed; then they fail where it is not.
+//! Each test starts itself again in a user namespace that has both networks, so it touches nothing
+//! of the machine's own network. Not every machine allows that, so these tests are ignored by
+//! default. `tests/run` runs them where the machine allows it; run elsewhere, they fail.
 
 #[path = "comm/scene.rs"]
 #[allow(dead_code, reason = "what other tests with a played station need")]
@@ -24,10 +24,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use lager_home::Clock;
 use lager_lines::Name;
 use lager_lines::command::read_wheels;
 use lager_lines::secret::Secrets;
-use lager_ports::Clock;
 use lager_station::{Doing, Listen, Server, ServerConfig, Station};
 use lager_tests::{alone, wait_for};
 use lager_topics::TruthPose;
@@ -35,23 +35,23 @@ use rustix::thread::{LinkNameSpaceType, move_into_link_name_space};
 
 use crate::scene::{Peer, Scene};
 
-/// Tells the test that it is in networks of its own.
+/// The environment variable that tells the test that it is in networks of its own.
 const INSIDE: &str = "LAGER_VANISHED";
-/// What runs a program as root of a user namespace with a network of its own.
+/// Arguments that run a program as root of a user namespace with a network of its own.
 const APART: [&str; 3] = ["--map-root-user", "--net", "--"];
 const OURS: &str = "192.0.2.1";
 const THEIRS: &str = "192.0.2.2";
-/// Within what a robot that is driven by hand stands when its link is lost, and how much later the
-/// simulated world may show that.
+/// The longest time until a robot driven by hand stands after its link was lost, and the longest
+/// delay until the simulated world shows that.
 const STANDS_WITHIN: Duration = Duration::from_millis(200);
 const SHOWN_AFTER: Duration = Duration::from_millis(20);
 
-/// A thread that sleeps 2 ms and gets no core for so long is held up.
+/// A thread that sleeps 2 ms was held up if it gets no core for this time.
 const HELD_UP: Duration = Duration::from_millis(20);
 
-/// A network that is connected to this one, and can be cut off.
+/// A network that is connected to this one until the test cuts it off.
 struct Network {
-    /// A process that keeps it.
+    /// A process that keeps the network alive.
     keeper: Child,
 }
 
@@ -85,7 +85,7 @@ impl Network {
         format!("/proc/{}/ns/net", self.keeper.id())
     }
 
-    /// What is made by a thread of that network.
+    /// Runs `make` in a thread of that network.
     fn inside<T: Send>(&self, make: impl FnOnce() -> T + Send) -> T {
         let network = File::open(self.path()).expect("it is kept");
         let enter = move || {
@@ -96,7 +96,7 @@ impl Network {
         std::thread::scope(|scope| scope.spawn(enter).join().expect("no panic"))
     }
 
-    /// From now on nothing arrives there and nothing comes from there.
+    /// From now on nothing arrives in that network and nothing leaves it.
     fn vanishes(&self) {
         self.ip(&["link", "set", "lager1", "down"]);
     }
@@ -116,7 +116,7 @@ impl Drop for Network {
     fn drop(&mut self) {
         let _ = self.keeper.kill();
         let _ = self.keeper.wait();
-        // It goes with either of its ends, and one is in a network that may live on for a moment.
+        // The link goes when either network goes, but a network may live on for a moment.
         let _ = Command::new("ip")
             .args(["link", "del", "lager0"])
             .stderr(Stdio::null())
@@ -133,13 +133,13 @@ fn runs(words: &[&str]) {
     assert!(status.is_ok_and(|status| status.success()), "{words:?}");
 }
 
-/// The network for this test, which runs itself again as root of it; `None` when it has passed
-/// there.
+/// The network for this test. Outside its namespace the test runs itself again as root of one; then
+/// this returns `None` when that run has passed.
 fn apart(test: &str) -> Option<Network> {
     if std::env::var_os(INSIDE).is_some() {
         return Some(Network::new());
     }
-    // Each is a process of its own, and a small machine drives one robot in time.
+    // Each such test is a process of its own, and a small machine can drive only one robot in time.
     let _until_it_ends = alone();
     let again = Command::new("unshare")
         .args(APART)
@@ -159,7 +159,7 @@ fn apart(test: &str) -> Option<Network> {
     None
 }
 
-/// A robot that drives by a station's word, in the other network.
+/// A robot that a station in the other network drives.
 fn driven(network: &Network, is_extended: bool) -> (Scene, Peer<TcpStream>) {
     let listener = network.inside(|| TcpListener::bind((THEIRS, 0)).expect("a port"));
     let mut scene = Scene::with(listener);
@@ -195,10 +195,10 @@ fn a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes() {
         let [ms, held_up_ms] = [after, held_up].map(|time| time.as_millis());
         println!("the robot stood {ms} ms after the cut; this machine was held up {held_up_ms} ms");
         let is_in_time = after <= STANDS_WITHIN + SHOWN_AFTER;
-        // A time of a machine that was held up says nothing, and is taken once more.
+        // A time taken while the machine was held up says nothing, so the test measures once more.
         assert!(is_in_time || held_up > HELD_UP, "{after:?}");
         good += u32::from(is_in_time);
-        // Nothing is carried out when the link is there again: it waits for a new word.
+        // When the link is back, the robot waits for a new command and carries out no old one.
         network.comes_back();
         drop(robot);
         robot = scene.robot();
@@ -210,7 +210,7 @@ fn a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes() {
     }
 }
 
-/// The document's language has no sign of life, so here the kernel has to find out.
+/// The document's language has no sign of life, so here the kernel has to detect the loss.
 #[test]
 #[ignore = "needs networks of its own; `tests/run` runs it where they can be had"]
 fn a_robot_stands_when_the_machine_of_a_plain_station_vanishes() {
@@ -262,7 +262,7 @@ fn what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back() {
         wait_for("the robot to show itself", shows);
         let anna = handle.take_wheel(&robot, "anna").expect("the seat is free");
         network.vanishes();
-        // Nothing of what the cut held up is under way any more.
+        // By now every command that the cut delayed has arrived.
         std::thread::sleep(Duration::from_millis(100));
         let asked = anna.drive(read_wheels("8").expect("a code"));
         std::thread::sleep(Duration::from_millis(cut));
@@ -276,7 +276,7 @@ fn what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back() {
     serves.join().expect("it has ended");
 }
 
-/// A robot as its station sees it, which says one line and then waits.
+/// A robot's connection to its station: it sends one line, and then waits.
 fn robot(at: SocketAddr, name: &str) -> BufReader<TcpStream> {
     let stream = TcpStream::connect(at).expect("it listens");
     stream
@@ -316,7 +316,7 @@ fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places() {
     let until = Arc::clone(&ends);
     let serves = std::thread::spawn(move || server.run(&until).expect("it serves"));
 
-    // As many as there are places for one address, and one more.
+    // As many as the station has places for one address, and one more.
     let crowd = network.inside(|| {
         let robots = 0..Station::MOST_OF_ONE_ADDRESS;
         let robots = robots.map(|number| robot(at, &format!("far-{number}")));

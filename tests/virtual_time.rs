@@ -1,4 +1,4 @@
-//! `lager simulate`: the whole robot in one process, in virtual time.
+//! Tests of `lager simulate`, which runs the whole robot in one process, in virtual time.
 
 use std::path::PathBuf;
 
@@ -39,8 +39,8 @@ fn twenty_seeds_deliver_in_three_warehouses() {
         assert_eq!(run["delivered"].as_array().map(Vec::len), Some(1), "{text}");
         assert_eq!(run["lost"], 0, "{run}");
         assert_eq!(run["collisions"], 0, "{run}");
-        // E15: on the tightest bend the tape is still under the outer sensors, 35 mm and its half
-        // width from the middle.
+        // E15: on the tightest bend the tape is still under the outer sensors. They are 35 mm from
+        // the middle, and half the tape's width is added.
         let lateral = run["lateral_mm"].as_f64().expect("a number");
         assert!(lateral > 0.0 && lateral < 42.5, "{run}");
         if run["warehouse"] == "small" {
@@ -52,7 +52,8 @@ fn twenty_seeds_deliver_in_three_warehouses() {
 
 #[test]
 fn missions_among_things_that_come_and_go_are_delivered_without_a_collision() {
-    let hall = concat!(env!("CARGO_MANIFEST_DIR"), "/data/hall.toml");
+    let hall = lager_tests::in_tree("tests/data/hall.toml");
+    let hall = hall.to_str().expect("a path in UTF-8");
     let mission = ["--seeds", "1..5", "--mission", "3,1,2", "--obstacles", "4"];
     let warehouses = [&WAREHOUSES[..], &["--warehouse", hall]].concat();
     let (runs, text) = simulate(&[&mission[..], &warehouses].concat());
@@ -70,7 +71,7 @@ fn the_same_seed_gives_the_same_run() {
     let args = [&["--seeds", "3..5"], &WAREHOUSES[..]].concat();
     let strip = |mut runs: Vec<Value>| {
         for run in &mut runs {
-            // Only how long the machine took may differ.
+            // Only the time that the machine took may differ.
             let run = run.as_object_mut().expect("an object");
             run.remove("wall_seconds").expect("wall_seconds");
             run.remove("times_real").expect("times_real");
@@ -80,7 +81,7 @@ fn the_same_seed_gives_the_same_run() {
     assert_eq!(strip(simulate(&args).0), strip(simulate(&args).0));
 }
 
-/// A warehouse file that is gone when this goes.
+/// A warehouse file; dropping this removes it.
 struct File(PathBuf);
 
 impl File {
@@ -118,7 +119,7 @@ fn squares_of(side_cm: u16) -> File {
 
 #[test]
 fn squares_of_every_size_are_driven_without_a_collision() {
-    // Where things come and go there must be room to turn beside them. The ranger sees 80 cm.
+    // Where things come and go there must be room to turn beside them. The ranger sees 80 cm far.
     for (side_cm, things) in [
         (45, "0"),
         (50, "4"),
@@ -169,8 +170,8 @@ fn squares_in_which_the_robot_has_no_room_are_refused_and_the_sentence_says_why(
     refused(&File::new("narrow", bare), &["--mission", "1"], things);
 }
 
-/// As large as a warehouse may be, 100 by 100 crossings and 256 products, with things that stand on
-/// the straight ways to the farthest of them.
+/// The largest warehouse that is allowed: 100 by 100 crossings and 256 products. Things stand on
+/// the straight ways to the farthest products.
 fn largest_warehouse() -> String {
     let mut text = String::from("size = [99, 99]\nside_length_cm = 50\n");
     for index in 0..256 {
@@ -189,7 +190,7 @@ fn largest_warehouse() -> String {
 #[test]
 fn the_largest_warehouse_is_crossed_round_what_stands_in_the_way() {
     let file = File::new("largest", &largest_warehouse());
-    // 145 edges each way. For 170 the battery of some robots does not last.
+    // 145 edges each way. For 170 edges, the battery of some robots would be empty too early.
     let args = [
         "--warehouse",
         file.name(),

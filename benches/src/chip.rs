@@ -1,8 +1,9 @@
-//! What the boards' images do, in cycles: the emulator's `--trace`, run as a process and read.
+//! Counts the cycles of the boards' images: runs the emulator with `--trace` as a process and reads
+//! its figures.
 //!
-//! Apart from the other scenarios, because nothing is timed here: cycles are exact and the same on
-//! every machine, except for the real-time factor. The guard holds each figure to 5 %. The emulator
-//! runs as a process of its own, because simavr's licence stays in `firmware/emulator`.
+//! It is no scenario like the others, because it times nothing: cycles are exact and the same on
+//! every machine, except for the real-time factor. The guard allows each figure 5 %. The emulator
+//! is another process, so that simavr's licence applies to `firmware/emulator` only.
 
 use core::fmt;
 use std::path::{Path, PathBuf};
@@ -14,10 +15,10 @@ use serde_json::Value;
 use crate::error::BenchError;
 use crate::machine;
 
-/// The baud rates of the lines to the Pi that there are images for: the default and the original's.
+/// The baud rates for which there are images: the default one and the original boards'.
 pub const BAUDS: [u32; 2] = [500_000, 9_600];
 
-/// What runs the chips, and the images in them.
+/// The emulator, and the images for its chips.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Programs {
     /// The executable `lager-emulator`.
@@ -29,7 +30,7 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Those that `.ci/firmware` leaves in a source tree for a baud rate.
+    /// The programs that `.ci/firmware` leaves in a source tree for a baud rate.
     #[must_use]
     pub fn in_tree(root: &Path, baud: u32) -> Self {
         let folder = if baud == 9_600 { "9600" } else { "" };
@@ -45,18 +46,18 @@ impl Programs {
 /// One exact figure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
-    /// `tape-to-duty@500kBd/worst`, ...
+    /// Its name: `tape-to-duty@500kBd/worst`, ...
     pub name: String,
-    /// How much.
+    /// Its value.
     pub value: f64,
-    /// Of what: `cycles`, `cycles/s`, `bytes`, `%`, `x`.
+    /// Its unit: `cycles`, `cycles/s`, `bytes`, `%`, `x`.
     pub unit: String,
-    /// So many cycles in milliseconds of the chips' time.
+    /// The same time in ms of the chips' clock, for a figure in cycles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ms: Option<f64>,
 }
 
-/// What the emulator says of the images for one baud rate.
+/// The emulator's output for the images of one baud rate.
 struct Trace(Value);
 
 impl Trace {
@@ -78,8 +79,8 @@ impl Trace {
             ms: (unit == "cycles").then_some(value / hertz * 1e3),
         };
         let mut figures = Vec::new();
-        // Over all phases tried, from the tape's jump to another duty, and to the first start bit
-        // of the packet that tells the line.
+        // Over all phases tried: from the tape's jump to the first other duty, and to the first
+        // start bit of the line packet.
         for (what, place) in [
             ("tape-to-duty", "/tape_to_duty"),
             ("tape-to-uart", "/tape_to_uart"),
@@ -89,7 +90,7 @@ impl Trace {
                 figures.push(figure(what, of, cycles, "cycles"));
             }
         }
-        // While the robot drives.
+        // These are counted while the robot drives.
         for board in ["/sensor", "/steering"] {
             let number = |place: &str| self.number(&format!("{board}{place}"));
             // The longest time from an interrupt's flag to its first instruction.
@@ -110,12 +111,12 @@ impl Trace {
     }
 }
 
-/// The exact figures.
+/// The report of `lager bench chip`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChipReport {
     /// The machine in one line.
     pub machine: String,
-    /// What was counted, and the real-time factor.
+    /// The exact figures, and the real-time factor.
     pub figures: Vec<Figure>,
     /// The version of rustc that built the images.
     pub rustc: String,
@@ -135,10 +136,10 @@ impl fmt::Display for ChipReport {
     }
 }
 
-/// Measures each baud rate's images, beside each other: chip time does not mind.
+/// Measures the images of all baud rates at the same time, which does not change chip time.
 ///
 /// # Errors
-/// A program is missing, or the emulator says why there are no figures.
+/// A program is missing, or the emulator gave no figures and says why.
 pub fn measure(programs: [(u32, Programs); BAUDS.len()]) -> Result<ChipReport, BenchError> {
     let emulator = programs[0].1.emulator.clone();
     let failed = |why| BenchError::Emulator(emulator.clone(), why);

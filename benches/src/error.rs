@@ -1,4 +1,4 @@
-//! Why a measurement ended without a report; every message says what to do.
+//! Why a measurement ended without a report. Every message says what to do.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use lager_rig::{NoPlace, ProcessError, Refused};
 /// Why a measurement ended without a report.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// Two processes that never share a core need two: how many are needed, and how many there are.
+    /// Two processes that never share a core need two: needed cores, and cores of this process.
     #[error(
         "this measurement needs {0} processor cores and this process may use {1}; run it on a larger machine, or without `taskset`, or choose `--regime same-core`"
     )]
@@ -18,26 +18,26 @@ pub enum BenchError {
     #[error(transparent)]
     Affinity(#[from] Unbound),
     /// The user may not run processes in real time.
-    #[error("{0}; what needs it was not measured")]
+    #[error("{0}; the rows that need this right were not measured")]
     RealTime(#[from] NoRealTime),
-    /// Nothing is left of what was asked for.
+    /// The chosen modes and regimes leave nothing to measure.
     #[error(
         "nothing to measure: {0}; choose other modes or regimes (a spinning receiver cannot share its core with the sender)"
     )]
     NothingToMeasure(&'static str),
-    /// The kernel refused something a measurement is made of.
+    /// The kernel refused something that a measurement needs.
     #[error(transparent)]
     Kernel(#[from] Refused),
-    /// The bus or bare iceoryx2 failed; it says why.
+    /// The bus or bare iceoryx2 failed, with its own message.
     #[error("{0}; check that /dev/shm exists, is writable and is not full")]
     Bus(String),
-    /// The measurement has no place for its bus.
+    /// There is no folder for the measurement's bus.
     #[error(transparent)]
     NoPlace(#[from] NoPlace),
-    /// A process of the measurement is of no use.
+    /// A process of the measurement failed.
     #[error(transparent)]
     Process(ProcessError),
-    /// What was measured failed.
+    /// A sample failed.
     #[error("`{contender}`, sample {sample}: {fault}")]
     Failed {
         /// The row being measured.
@@ -47,18 +47,18 @@ pub enum BenchError {
         /// What is wrong with it.
         fault: Fault,
     },
-    /// The other process did not come to the start within that time.
+    /// The other process did not come to the start of the round within that time.
     #[error(
         "the other process of the measurement was not ready within {0:?}; the machine is overloaded, or it has ended: look at the messages above and start again"
     )]
     Alone(Duration),
-    /// A program of the chips is not there.
+    /// The emulator or an image does not exist.
     #[error("there is no {0}; build the boards' images and the emulator with `.ci/firmware`")]
     NotBuilt(PathBuf),
-    /// The emulator has no figures; it says why.
-    #[error("{0} measured nothing ({1}); build it and the images anew with `.ci/firmware`")]
+    /// The emulator gave no figures, with its own message.
+    #[error("{0} measured nothing ({1}); build it and the images again with `.ci/firmware`")]
     Emulator(PathBuf, String),
-    /// Somebody wants to stop.
+    /// The user wants to stop.
     #[error("interrupted; nothing was left behind")]
     Interrupted,
 }
@@ -73,27 +73,27 @@ pub enum Fault {
     Silent(Duration),
     /// It did not come within that time, because the kernel did not let a process run.
     #[error(
-        "it did not come within {0:?}, because one of the processes is ready to run and gets no core: end what else runs on this machine and start again"
+        "it did not come within {0:?}, because one of the processes is ready to run and gets no core: end other programs on this machine and start again"
     )]
     Starved(Duration),
-    /// Another one came: one that was not sent, or twice, or in the wrong order.
+    /// Another sample came: one that nobody sent, one twice, or one in the wrong order.
     #[error(
         "sample {0} came in its place, or it is damaged; this is a defect, please report it with the command line"
     )]
     Wrong(u64),
-    /// What carries it failed; it says why.
+    /// The carrier of the samples failed, with its own message.
     #[error("{0}; start again, and report it if it happens twice")]
     Broken(String),
 }
 
-/// What a bus that cannot be used says.
+/// The error of a bus that cannot be used.
 pub(crate) fn no_bus(error: impl core::fmt::Display) -> BenchError {
     BenchError::Bus(format!(
         "the bus of the measurement cannot be used: {error}"
     ))
 }
 
-/// A fault of what carries samples.
+/// The fault of a carrier of samples that failed.
 pub(crate) fn broken(error: impl core::fmt::Display) -> Fault {
     Fault::Broken(error.to_string())
 }

@@ -1,9 +1,9 @@
-//! Rows that take turns: in short rounds within each run, so that whatever the machine does
-//! meanwhile hits all of them alike; ratios are taken within a run.
+//! A group of rows that take turns in short rounds within each run. So other work on the machine
+//! hits all rows alike, and a ratio compares figures of one run.
 //!
-//! This is the one definition of a measurement: `lager bench` and the guard run whole groups
-//! ([`Group::measure`]), criterion times single rows ([`Group::open`]). What a round is, the
-//! scenario says; nothing here reads a clock.
+//! This file alone defines how a measurement runs: `lager bench` and the guard run whole groups
+//! ([`Group::measure`]), criterion times single rows ([`Group::open`]). The scenario defines a
+//! round; nothing here reads a clock.
 
 use std::io::{IsTerminal, Write};
 
@@ -12,7 +12,6 @@ use lager_rig::{heed_interrupts, interrupted};
 use crate::error::BenchError;
 use crate::machine::kept_awake;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
-use crate::slow;
 use crate::stats::{Quantiles, median};
 
 /// One line of a report before it is measured.
@@ -22,8 +21,8 @@ pub struct Entry {
     pub label: &'static str,
     /// See [`Row::mode`].
     pub mode: Mode,
-    /// The labels it is compared with, the most important first; each belongs to an entry of the
-    /// same group whose label is unique there.
+    /// The labels with which it is compared, the most important first. Each is the unique label of
+    /// an entry of the same group.
     pub against: &'static [&'static str],
 }
 
@@ -41,16 +40,16 @@ impl Entry {
     }
 }
 
-/// What is open while a group is measured. Stays in the thread that opened it: its processes end
-/// with that thread, which may be bound to a core meanwhile.
+/// The processes that are open while a group is measured. It stays in the thread that opened it:
+/// the processes end with that thread, which may also be bound to a core.
 pub trait Session {
-    /// Measures the entry with that index so many times; how long each took, in ns.
+    /// Measures the entry with that index `samples` times; returns how long each took, in ns.
     ///
     /// # Errors
-    /// A process or the carrier failed; the session is of no more use.
+    /// A process or the carrier failed; the session cannot be used any more.
     fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError>;
 
-    /// When all is measured: adds to the rows what else there is to say.
+    /// Adds further figures to the rows when everything is measured.
     ///
     /// # Errors
     /// As [`Session::round`].
@@ -59,10 +58,10 @@ pub trait Session {
     }
 }
 
-/// What opening a session yields.
+/// The result of opening a session.
 pub type Opened = Result<Box<dyn Session>, BenchError>;
 
-/// Rows that are measured against each other.
+/// Rows that are compared with each other.
 pub struct Group {
     /// See [`Row::what`].
     pub what: String,
@@ -70,15 +69,15 @@ pub struct Group {
     pub regime: Regime,
     /// The rows.
     pub entries: Vec<Entry>,
-    /// Rounds of each entry in a run: quick, and in full.
+    /// Rounds of each entry in a run: with `--quick`, and without.
     pub(crate) rounds: [usize; 2],
-    /// Samples of a round: quick, and in full.
+    /// Samples of a round: with `--quick`, and without.
     pub(crate) samples: [usize; 2],
     pub(crate) open: Box<dyn Fn() -> Opened + Send>,
 }
 
 impl Group {
-    /// Starts what is needed to measure it in this thread.
+    /// Starts in this thread the processes that measure it.
     ///
     /// # Errors
     /// See [`BenchError`].
@@ -87,13 +86,12 @@ impl Group {
         (self.open)()
     }
 
-    /// Measures every entry against the others, in a thread of its own: `options.runs` runs of some
-    /// rounds each, every entry once in each round, each round beginning with another one. Without
-    /// the right to real time, what needs it is left out, with a sentence: the rest is worth
-    /// having.
+    /// Measures all entries in a thread of its own, in `options.runs` runs of some rounds. In each
+    /// round every entry has one turn; each round begins with another entry. If the user has no
+    /// right to real time, prints a sentence and leaves out what needs that right.
     ///
     /// # Errors
-    /// A session failed, or somebody wants to stop.
+    /// A session failed, or the user wants to stop.
     pub(crate) fn measure(self, options: &Options) -> Result<Vec<Row>, BenchError> {
         let measured = std::thread::scope(|scope| {
             let measuring = scope.spawn(move || self.open_and_measure(options));
@@ -137,7 +135,6 @@ impl Group {
                     let entry = &entries[index];
                     let row = format!("{what} {} {regime}: {}", entry.mode, entry.label);
                     tell(&format!("{row}, run {} of {count}", run + 1));
-                    slow::row(&row);
                     samples[index].extend(session.round(index, self.samples[thorough])?);
                 }
             }
@@ -150,7 +147,7 @@ impl Group {
     }
 }
 
-/// The rows of what was measured: `runs` holds each entry's runs, the same number of each.
+/// The rows of the results: `runs` holds each entry's runs, the same number of each.
 fn rows(what: &str, regime: Regime, entries: &[Entry], runs: &[Vec<Quantiles>]) -> Vec<Row> {
     let row = |(entry, own): (&Entry, &Vec<Quantiles>)| {
         let times = Quantiles::over(own)?;
@@ -166,13 +163,13 @@ fn rows(what: &str, regime: Regime, entries: &[Entry], runs: &[Vec<Quantiles>]) 
     entries.iter().zip(runs).filter_map(row).collect()
 }
 
-/// The median of the ratios of each run: what drifts from run to run cancels.
+/// The median of each run's ratio, in which a drift from run to run cancels.
 fn ratio(to: &str, own: &[Quantiles], other: &[Quantiles]) -> Option<Ratio> {
     let by = |own: u64, other: u64| own as f64 / other as f64;
     let runs: Vec<[f64; 2]> = own
         .iter()
         .zip(other)
-        // A clock that cannot tell a sample from nothing cannot tell ratios either.
+        // If the clock is too coarse for the samples, there are no ratios.
         .filter(|(_, other)| other.p50_ns > 0)
         .map(|(own, other)| [by(own.p50_ns, other.p50_ns), by(own.p99_ns, other.p99_ns)])
         .collect();
@@ -184,7 +181,7 @@ fn ratio(to: &str, own: &[Quantiles], other: &[Quantiles]) -> Option<Ratio> {
     })
 }
 
-/// Tells a person at a terminal what is going on, in the place of what was told before.
+/// Shows the current step to a person at a terminal, in place of the step before.
 fn tell(now: &str) {
     let mut terminal = std::io::stderr();
     if terminal.is_terminal() {
@@ -202,7 +199,7 @@ mod tests {
         Entry::new("pipe", Mode::Block, &[]),
     ];
 
-    /// What each round of an entry of [`ENTRIES`] yields.
+    /// The results of each round of an entry of [`ENTRIES`].
     struct Planned<R>(R);
 
     impl<R: FnMut(usize) -> Result<Vec<u64>, BenchError>> Session for Planned<R> {
@@ -245,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_machine_that_drifts_from_run_to_run_does_not_move_a_ratio() {
-        // Each run is ten times slower than the one before, for both alike.
+        // Each run is ten times slower than the one before, for both entries alike.
         let mut rounds = [0_u32; 2];
         let rows = measure(&ENTRIES[..2], 3, 1, |index| {
             let drift = 10_u64.pow(rounds[index]);

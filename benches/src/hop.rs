@@ -1,4 +1,4 @@
-//! `hop`: one way between two processes.
+//! `hop`: measures the time of a sample from one process to another.
 //!
 //! ```text
 //!              sender, core 0                    receiver, core 1
@@ -7,13 +7,13 @@
 //!   received ─ receive <────── the same back ──────── send      one way = (received - sent) / 2
 //! ```
 //!
-//! Both ends are the same contender and wait the same way, except for `adaptive`: there the
-//! receiver adapts, and the sender spins, so that it sends at the pace that the row names. Then
-//! only the way to the receiver is timed, for the contender and for its baseline (both ends read
-//! the same clock, CLOCK_MONOTONIC); half a round trip would hide half of a delay at one end.
+//! Both ends use the same carrier and wait in the same way, except in `adaptive`. There the
+//! receiver adapts, and the sender spins to keep the pace in the row's name. Only the way to the
+//! receiver is timed then, for the carrier and for its baseline (both ends read the same clock,
+//! CLOCK_MONOTONIC): half of a round trip would hide half of a delay at one end.
 //!
-//! Rows called `hop` are half of the round trip, as fast as samples come back; `hop@full-rate` is
-//! one way at the same rate, `hop@10kHz` with a sample every 100 µs.
+//! Rows called `hop` are half of the round trip, as fast as samples come back. `hop@full-rate` is
+//! one way at the same rate, `hop@10kHz` one way with a sample every 100 µs.
 
 mod ends;
 
@@ -42,13 +42,13 @@ fn exchange(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     pair::measure(parent, ends::round)
 }
 
-/// From one sample to the next when they come at 10 kHz.
+/// The time from one sample to the next at 10 kHz.
 const PACE: Duration = Duration::from_micros(100);
 
-/// The groups of one regime: rows of one mode, and what they are compared with.
+/// The groups of one regime: the rows of one mode, and their baselines.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    // The time from one sample to the next, where one way is timed; and the samples of a round, as
-    // many as take a fraction of a second.
+    // For each group: the time from one sample to the next if one way is timed, and the number of
+    // samples that take a fraction of a second.
     let [full_rate, paced] = [Duration::ZERO, PACE].map(Some);
     [
         ("hop", Mode::Spin, None, [5_000, 20_000]),
@@ -58,7 +58,7 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     ]
     .into_iter()
     .filter(|(_, mode, ..)| options.modes.contains(mode))
-    // On a shared core, whoever looks without pause keeps the sender from sending.
+    // On a shared core, a process that looks without pause keeps the sender from sending.
     .filter(|(_, mode, ..)| regime != Regime::SameCore || *mode == Mode::Block)
     .map(|(what, mode, gap, samples)| {
         let takes_part =
@@ -83,10 +83,10 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     .collect()
 }
 
-/// What goes through the kernel, in the order that `ends` takes it in.
+/// The descriptors of the kernel's carriers, in the order of the constants in `ends`.
 fn lines() -> Result<[[OwnedFd; 2]; 5], BenchError> {
     let a_pipe = || pipe().map_err(Refused::to_make("a pipe"));
-    // Without CLOEXEC: the processes inherit it.
+    // Without CLOEXEC, so that the processes inherit it.
     let bell = || eventfd(0, EventfdFlags::empty()).map_err(Refused::to_make("an eventfd"));
     let uds = stream::datagrams().map_err(Refused::to_make("a Unix socket"))?;
     let tcp = stream::loopback().map_err(Refused::to_make("a TCP connection over loopback"))?;
@@ -99,12 +99,12 @@ fn lines() -> Result<[[OwnedFd; 2]; 5], BenchError> {
     ])
 }
 
-/// What the floor of a blocking hop is called.
+/// The name of the least time that a blocking hop can take.
 const ITS_PARTS: &str = "futex + polled iceoryx2";
 
-/// Compares the blocking hop on one core with the sum of what it is made of: a hop of a futex on
-/// that core, and one of bare iceoryx2 that is polled from another core. The sum has one cache line
-/// too many, which both pass.
+/// Compares the blocking hop on one core with the sum of its two parts: a hop of a futex on that
+/// core, and a hop of bare iceoryx2 that is polled from another core. Each part passes a cache
+/// line, so the sum has one too many.
 pub(crate) fn beside_its_parts(rows: &mut [Row]) {
     let find = |label: &str, mode, regime| {
         let is_it = |row: &&Row| {

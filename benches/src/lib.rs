@@ -1,15 +1,15 @@
 //! The project's measurements, each beside its baseline in the same run.
 //!
 //! A [`Scenario`] is defined once, as groups of rows that take turns ([`Group`]). `lager bench` and
-//! the guard measure whole groups and get a [`Report`], which prints as a table and serialises as
-//! JSON; criterion times single rows. [`steps`] are the parts of the path within one process, for
+//! the guard measure whole groups and get a [`Report`], which is printed as a table or as JSON;
+//! criterion times single rows. [`steps`] has the steps of the path within one process, for
 //! criterion and for counting instructions. [`chip`] counts cycles of the boards' images instead;
 //! these are exact and have no baseline.
 //!
-//! Absolute times mean little on a shared machine. So candidates and baselines take turns within
-//! one run, and a report states ratios of one run. Nothing here asserts a time; the guard does.
+//! An absolute time means little on a shared machine. So rows and baselines take turns within one
+//! run, and a report has ratios of one run. Nothing here asserts a time; the guard does.
 //!
-//! **Invariant:** every wait of a measurement has a limit, and nothing is left behind when it ends.
+//! **Invariant:** every wait of a measurement has a limit, and a measurement leaves nothing behind.
 
 mod baseline;
 pub mod chip;
@@ -36,11 +36,11 @@ pub use report::{Mode, Options, Ratio, Regime, Report, Row};
 pub use scenario::Scenario;
 pub use stats::{Quantiles, median};
 
-/// What the folders of measurements begin with.
+/// The prefix of the folders of measurements.
 pub const FAMILY: &str = "lager-bench";
 
-/// If this process was started as one of a scenario's, is that and ends; otherwise returns at once.
-/// To be called first thing in `main` of every executable that measures.
+/// If this process was started as a scenario's child, does the child's work and ends; otherwise
+/// returns at once. Every program that measures calls it first in `main`.
 pub fn run_if_asked() {
     lager_rig::process::run_if_asked(&[
         machine::PROCESSES,
@@ -49,4 +49,15 @@ pub fn run_if_asked() {
         path::PROCESSES,
         path::FLOOR_PROCESSES,
     ]);
+}
+
+/// The number of runs given on a command line.
+///
+/// # Errors
+/// A sentence that says which numbers are allowed.
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) | Err(_) => Err("give a whole number, 1 or more".to_owned()),
+        Ok(number) => Ok(number),
+    }
 }

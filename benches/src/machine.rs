@@ -1,8 +1,8 @@
-//! The machine: what it is, which cores a scenario runs on, and the processes that keep cores from
-//! halting.
+//! The machine: its name and parts, the cores that a scenario uses, and the processes that keep
+//! cores from halting.
 //!
-//! It is apart because every scenario binds its processes to cores and says on what machine it ran.
-//! It never changes anything for other processes.
+//! Every scenario binds its processes to cores and reports the machine it ran on, so this code
+//! stands apart. It changes nothing for other processes.
 
 use std::error::Error;
 
@@ -48,8 +48,8 @@ fn processor_of(cpuinfo: &str) -> Option<String> {
     })
 }
 
-/// Where the first and the second process of a scenario run: on one core for
-/// [`Regime::SameCore`], on one each otherwise.
+/// The cores of a scenario's two processes: the same one in [`Regime::SameCore`], otherwise one
+/// each.
 pub(crate) fn cores_for(regime: Regime) -> Result<(usize, usize), BenchError> {
     match (regime, usable_cores().as_slice()) {
         (Regime::SameCore, [.., last]) => Ok((*last, *last)),
@@ -59,7 +59,7 @@ pub(crate) fn cores_for(regime: Regime) -> Result<(usize, usize), BenchError> {
     }
 }
 
-/// The processes that keep the cores from halting as long as they live, if `regime` asks for it.
+/// The processes that keep the cores from halting while they live; none if `regime` needs none.
 pub(crate) fn kept_awake(regime: Regime) -> Result<Vec<Process>, BenchError> {
     let mut cores = usable_cores();
     if regime != Regime::NoHalt {
@@ -73,11 +73,11 @@ pub(crate) fn kept_awake(regime: Regime) -> Result<Vec<Process>, BenchError> {
     started.collect()
 }
 
-/// Runs whenever nothing else wants the core, until it is killed.
+/// Runs whenever nothing else needs the core, until it is killed.
 ///
-/// It gives way all the time: what has the core keeps it until the kernel's next tick, 4 ms at
-/// 250 Hz, also against a process that yields it for a moment. An adaptive receiver yields every
-/// 4 us (`lager_ports::Waiter`), and lost its core to this process until then.
+/// It yields the core all the time. A process that only yields for a moment would otherwise get its
+/// core back at the kernel's next tick, 4 ms later at 250 Hz. An adaptive receiver yields every 4
+/// us (`lager_wake::Waiter`), and lost its core to this process that long.
 fn keep_from_halting(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     pin(parent.told()?)?;
     schedule(libc::SCHED_IDLE).map_err(Refused::to_make("a process of the lowest priority"))?;

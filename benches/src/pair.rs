@@ -1,13 +1,13 @@
-//! Two processes that measure rounds with each other, each on its core: what `hop`, `ring-64` and
-//! `publish` have in common.
+//! Two processes that measure rounds with each other, each on its core. `hop`, `ring-64` and
+//! `publish` use them.
 //!
 //! ```text
 //!   session ── Round ──> first:  opens its ports ─┐  barrier ─ samples ─ barrier ─> times, in ns
 //!           ── Round ──> second: opens its ports ─┘
 //! ```
 //!
-//! Each round has ports of its own, so that what a place in memory does to the times differs from
-//! round to round. Its first samples are not timed: ports meet with them, and caches fill.
+//! Each round has new ports, so that their places in memory differ from round to round. The first
+//! samples are not timed: meanwhile publisher and subscriber find each other, and caches fill.
 
 use core::time::Duration;
 use std::error::Error;
@@ -27,21 +27,20 @@ use crate::error::{BenchError, Fault, no_bus};
 use crate::group::{Entry, Opened, Session};
 use crate::machine;
 use crate::report::Regime;
-use crate::slow;
 
-/// Rounds of each row in a run: quick, and in full.
+/// Rounds of each row in a run: with `--quick`, and without.
 pub(crate) const ROUNDS: [usize; 2] = [2, 4];
 
-/// What both processes see without a bus.
+/// The memory that both processes share beside the bus.
 #[derive(Debug)]
 #[repr(C)]
 pub(crate) struct Memory {
     barrier: Barrier,
-    /// What each of the two writes into.
+    /// The lane that each of the two processes writes to.
     pub(crate) lanes: Lanes<8>,
-    /// The sample that the readers are ready for: they have all that came before.
+    /// The number of the sample for which the readers are ready: they have read all before it.
     pub(crate) ready: Counter,
-    /// The last sample that the writer has published.
+    /// The number of the last sample that the writer has published.
     pub(crate) published: Counter,
 }
 
@@ -49,33 +48,31 @@ pub(crate) struct Memory {
 #[allow(unsafe_code)]
 unsafe impl Shareable for Memory {}
 
-/// What a process is told once.
+/// The parent's first message to a process.
 #[derive(Serialize, Deserialize)]
 struct Setup {
     is_first: bool,
-    /// The core to stay on.
+    /// The core to which the process is bound.
     core: usize,
     /// The bus's folder.
     folder: PathBuf,
-    /// The number of the memory.
+    /// The descriptor of the shared memory.
     memory: RawFd,
     lines: Vec<[RawFd; 2]>,
 }
 
-/// What both processes are told for each round.
+/// The parent's message to both processes for each round.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Round<X> {
-    /// Which round it is, from 1.
+    /// The number of the round, from 1.
     pub(crate) number: u32,
-    /// Samples that are sent before any is timed.
+    /// The number of samples before the first timed one.
     warm_up: u32,
-    /// Samples that are timed.
+    /// The number of timed samples.
     samples: u32,
-    /// A deliberate slow-down of each sample, in ns.
-    spin_ns: u64,
-    /// What carries the samples, for the sentences of errors.
+    /// The name of the carrier, for the sentences of errors.
     contender: String,
-    /// What is measured.
+    /// The measurement.
     pub(crate) what: X,
 }
 
@@ -86,7 +83,7 @@ impl<X> Round<X> {
         (1..=u64::from(self.warm_up) + u64::from(self.samples)).map(move |sample| base + sample)
     }
 
-    /// What is wrong with sample `number`.
+    /// The error of sample `number`.
     pub(crate) fn failed(&self, number: u64, fault: Fault) -> BenchError {
         let in_round = |number: u64| number & u64::from(u32::MAX);
         BenchError::Failed {
@@ -100,8 +97,8 @@ impl<X> Round<X> {
     }
 }
 
-/// Both processes, and what they measure for each row. Dropped in this order: nobody is on the bus
-/// when it is swept.
+/// Both processes, and the measurement of each row. The fields are dropped in this order, so no
+/// process is on the bus when it is removed.
 struct Pair<X> {
     first: Process,
     second: Process,
@@ -111,7 +108,7 @@ struct Pair<X> {
     rounds: u32,
 }
 
-/// Starts both processes, with `lines` that they inherit, to measure `rows`.
+/// Starts both processes, which inherit `lines`, to measure `rows`.
 pub(crate) fn open<X: Serialize + 'static>(
     regime: Regime,
     [first, second]: [&str; 2],
@@ -144,11 +141,11 @@ pub(crate) fn open<X: Serialize + 'static>(
 }
 
 impl<X: Serialize> Session for Pair<X> {
-    /// The first process's times. If the second has any, they are when it received what the first
-    /// sent at its times.
+    /// The first process's times. If the second process returns times, both return readings of the
+    /// clock, and the result is the time from the first's to the second's.
     fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
-        // Both give up by themselves when nothing comes; this is for those that cannot, because
-        // a bare `read` has no time-out: ten times what the slowest machine should need.
+        // Each process ends a wait by itself, except a bare `read`, which has no time-out. For that
+        // one the parent waits ten times as long for a sample as the slowest machine should need.
         const SAMPLE: Duration = Duration::from_millis(1);
         self.rounds += 1;
         let (entry, what) = &self.rows[index];
@@ -157,7 +154,6 @@ impl<X: Serialize> Session for Pair<X> {
             number: self.rounds,
             warm_up: samples / 10 + 10,
             samples,
-            spin_ns: slow::spin_ns(),
             contender: format!("{} {}", entry.label, entry.mode),
             what,
         };
@@ -169,13 +165,13 @@ impl<X: Serialize> Session for Pair<X> {
         if received.is_empty() {
             return Ok(sent);
         }
-        assert_eq!(sent.len(), received.len(), "a time at each end for each");
+        assert_eq!(sent.len(), received.len(), "each has a time at each end");
         let way = |(sent, received): (u64, u64)| received.saturating_sub(sent);
         Ok(sent.into_iter().zip(received).map(way).collect())
     }
 }
 
-/// One of the two: takes its place, and measures rounds as long as the parent wants any.
+/// One of the two processes: binds itself to its core, and measures the parent's rounds.
 pub(crate) fn measure<X: DeserializeOwned>(
     parent: &mut Parent,
     round: fn(&Side, &Round<X>) -> Result<Vec<u64>, BenchError>,
@@ -190,9 +186,8 @@ pub(crate) fn measure<X: DeserializeOwned>(
     };
     parent.say(&())?;
     while let Some(told) = parent.hear::<Round<X>>()? {
-        slow::spins_for(told.spin_ns);
         let times = round(&side, &told)?;
-        // Those of the first samples do not count.
+        // The times of the warm-up samples do not count.
         let counted: &[u64] = match &*times {
             [] => &[],
             times => &times[told.warm_up as usize..],
@@ -202,7 +197,7 @@ pub(crate) fn measure<X: DeserializeOwned>(
     Ok(())
 }
 
-/// What one of the two has at hand all the time.
+/// What one of the two processes keeps during all rounds.
 pub(crate) struct Side {
     pub(crate) is_first: bool,
     pub(crate) shared: Shared<Memory>,
@@ -211,7 +206,7 @@ pub(crate) struct Side {
 }
 
 impl Side {
-    /// Waits until `counter` is at sample `number`.
+    /// Waits until `counter` has reached sample `number`.
     pub(crate) fn wait(&self, counter: &Counter, number: u64) -> Result<(), Fault> {
         let comes = counter.becomes(number, LIMIT);
         comes.then_some(()).ok_or(Fault::Silent(LIMIT))

@@ -1,4 +1,4 @@
-//! The whole way from a sensor frame to the command it causes, over the wires' ends.
+//! `path`: times the whole way from a sensor frame to its command, between the ends of two wires.
 //!
 //! ```text
 //!   t0 | write -> pty -> bridge's reader -> sensor/line -> logic -> steering/command
@@ -6,22 +6,22 @@
 //! ```
 //!
 //! Bridge and logic are the real services in processes of their own ([`robot`]). The floor is the
-//! same chain made of bare system calls ([`floor`]). Frames come at 1 kHz and each of them must be
-//! answered, or the measurement ends with an error. The chains take turns within each run; those
-//! that wait for their turn are stopped (SIGSTOP).
+//! same chain made of bare system calls ([`floor`]). Frames come at 1 kHz; a frame without an
+//! answer ends the measurement with an error. The chains take turns within each run; SIGSTOP stops
+//! the chains that wait for their turn.
 //!
 //! | `what` | row | compared with |
 //! |---|---|---|
 //! | `path` | `lager/block` | `floor` |
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
 //! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
-//! | `path-overtaken` | the samples of each `lager` row whose command was overtaken | |
+//! | `path-overtaken` | frames of each `lager` row whose command was overtaken | |
 //!
-//! An observer is a process of its own on a node of its own, subscribed to `sensor/line` and
-//! `steering/command`, that reads all that has come ten times a second.
+//! An observer is a process on an iceoryx2 node of its own. It subscribes to `sensor/line` and
+//! `steering/command`, and ten times a second it reads all that has come.
 //!
 //! **Cores**: the boards, the bridge and the floor's ends are bound to the first core, logic and
-//! the floor's middle to the second; in the regime of one core all are on that one.
+//! the floor's middle to the second. In the regime of one core, all are bound to that core.
 
 mod floor;
 mod processes;
@@ -29,7 +29,7 @@ mod robot;
 mod services;
 mod turn;
 
-use lager_rig::schedule::{Bound, NoRealTime, Place, RealTime};
+use lager_rig::schedule::{Bound, NoRealTime, Placement, RealTime};
 
 use crate::error::BenchError;
 use crate::group::{Entry, Group, Session};
@@ -43,17 +43,17 @@ use turn::{Chain, TURN, turn};
 pub(crate) use floor::PROCESSES as FLOOR_PROCESSES;
 pub(crate) use services::PROCESSES;
 
-/// Turns of each chain in one run: quick, and in full.
+/// Turns of each chain in one run: with `--quick`, and without.
 const TURNS: [usize; 2] = [2, 8];
 
-/// SCHED_FIFO priorities: the boards are hardware, so nothing of the robot comes before them.
+/// SCHED_FIFO priorities. The boards stand for hardware, so they run before all of the robot.
 const SERVICES: u8 = 40;
 const BOARDS: u8 = 50;
 
-/// What is measured, and the number of observers.
+/// The rows, each with its number of observers.
 type Rows = [(Entry, usize); 3];
 
-/// With nobody watching.
+/// The rows without observers.
 static ALONE: Rows = [
     (Entry::new("lager/block", Mode::Block, &["floor"]), 0),
     (Entry::new("floor", Mode::Block, &[]), 0),
@@ -63,7 +63,7 @@ static ALONE: Rows = [
     ),
 ];
 
-/// With and without observers.
+/// The rows with and without observers, in real time.
 static OBSERVED: Rows = [
     (Entry::new("lager/alone", Mode::Block, &[]), 0),
     (
@@ -76,8 +76,8 @@ static OBSERVED: Rows = [
     ),
 ];
 
-/// The groups of one regime. A spinning path is not measured: bridge and logic would keep two
-/// cores, and the boards need one.
+/// The groups of one regime. No row spins: bridge and logic would use two cores, and the boards
+/// need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     let group = |what: &str, rows: &'static [(Entry, usize)], observed: bool| Group {
         what: what.to_owned(),
@@ -88,7 +88,7 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
         open: Box::new(move || Ok(Box::new(Chains::start(regime, rows, observed)?))),
     };
     let wants = |mode| options.modes.contains(&mode);
-    // Nobody spins on the only core that the others have.
+    // On one core, an adaptive service would spin on the core that the others need.
     let adapts = wants(Mode::Adaptive) && regime != Regime::SameCore;
     let mut groups = Vec::new();
     if adapts || wants(Mode::Block) {
@@ -100,7 +100,7 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     groups
 }
 
-/// The chains that take turns; the thread that plays their boards is bound to a core meanwhile.
+/// The chains that take turns. The thread that plays their boards is bound to a core meanwhile.
 struct Chains {
     chains: Vec<Box<dyn Chain>>,
     regime: Regime,
@@ -109,10 +109,10 @@ struct Chains {
 }
 
 impl Chains {
-    /// Robots and the floor; or robots that are observed, with services and boards in real time.
+    /// Starts robots and the floor, or observed robots whose services and boards run in real time.
     fn start(regime: Regime, rows: &[(Entry, usize)], observed: bool) -> Result<Self, BenchError> {
         let (first, second) = cores_for(regime)?;
-        let [ends, logic] = [first, second].map(|core| Place {
+        let [ends, logic] = [first, second].map(|core| Placement {
             core: Some(core),
             priority: observed.then_some(SERVICES),
         });
@@ -134,7 +134,7 @@ impl Chains {
             chains,
             regime,
             observed,
-            // Last of all: what a thread starts inherits its core.
+            // The last field: all that a thread starts inherits the thread's core.
             _bound: Bound::to(first)?,
         })
     }
@@ -145,8 +145,8 @@ impl Session for Chains {
         turn(&mut *self.chains[index], samples)
     }
 
-    /// Processor time, unless it is real time, and how many of a robot's frames were overtaken; all
-    /// 0 if none was.
+    /// Adds the processor time, except in real time, and for each robot the number of its overtaken
+    /// frames, with all figures 0 if there was none.
     fn finish(&mut self, rows: &mut Vec<Row>) -> Result<(), BenchError> {
         let mut more = Vec::new();
         for (row, chain) in rows.iter_mut().zip(&mut self.chains) {
@@ -164,12 +164,12 @@ impl Session for Chains {
     }
 }
 
-/// Whether this process may have real time, without which nothing is `path@observed`.
+/// Whether this process may run in real time, which `path@observed` needs.
 ///
 /// # Errors
 /// It may not; the sentence says what to do.
 pub fn may_have_real_time() -> Result<(), NoRealTime> {
-    // In a thread of its own, which ends with what it got.
+    // The thread that gets real time ends at once.
     std::thread::spawn(|| RealTime::begin(BOARDS).map(drop))
         .join()
         .unwrap_or_else(|panic| std::panic::resume_unwind(panic))

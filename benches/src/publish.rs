@@ -1,5 +1,5 @@
-//! What publishing and waking cost a writer: `publish-N` (the scenario `fanout`) and `ring-64`
-//! (a part of the scenario `hop`).
+//! Measures how long publishing and waking take for the writer: `publish-N` (the scenario `fanout`)
+//! and `ring-64` (a part of the scenario `hop`).
 //!
 //! ```text
 //!   writer, core 0                                 readers, core 1
@@ -8,19 +8,19 @@
 //!   |<--- measured ---->|
 //! ```
 //!
-//! The readers live in a process of their own and are drained after each publish, so that no buffer
-//! is ever full and the writer finds its queues as readers leave them.
+//! The readers are in another process and empty their queues after each publish, so no buffer is
+//! ever full.
 //!
-//! **`publish-N`**: our typed ports and bare iceoryx2 with the same user header, the same limits
-//! and the same number of subscribers, in turn. Both fill in the whole payload from memory of their
-//! own. Rows are called `publish-64` for 64 bytes to 64 subscribers, `publish-8@1MiB`, and so on.
+//! **`publish-N`**: the typed ports and bare iceoryx2 take turns, with the same user header, the
+//! same limits and the same number of subscribers. Both fill in the whole payload from their own
+//! memory. Rows are called `publish-64` for 64 bytes to 64 subscribers, `publish-8@1MiB`, and so
+//! on.
 //!
-//! **`ring-64`**: what it costs a writer to wake the one actor of a topic that 64 observers read,
-//! for which the writer is kept from its work. The cost of the ring alone is the difference between
-//! publishing while the actor waits for a ring and publishing on the same ports while it sleeps for
-//! something else, measured in pairs (`lager/ring`). It compares with iceoryx2 notifying without
-//! publishing anything: a listener for each reader (`notify`), or, as the typed ports do it, one
-//! listener for the actor while 64 readers poll (`notify-1`).
+//! **`ring-64`**: the time that a writer needs to wake the one actor of a topic with 64 observers.
+//! It is the difference of two publishes on the same ports, measured in pairs (`lager/ring`): one
+//! while the actor waits for a ring, one while it sleeps for something else. It is compared with an
+//! iceoryx2 notification without a publish: to a listener for each reader (`notify`), or to one
+//! listener for the actor while 64 readers poll (`notify-1`), as in the typed ports.
 
 mod ends;
 
@@ -28,7 +28,8 @@ use std::error::Error;
 
 use lager_rig::Parent;
 use lager_rig::process::Main;
-use lager_topics::OBSERVERS;
+use lager_sample::Topic;
+use lager_topics::SensorLine;
 
 use crate::group::{Entry, Group};
 use crate::pair;
@@ -44,7 +45,7 @@ fn take_turns(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     pair::measure(parent, ends::round)
 }
 
-/// `publish-N` in one regime. The readers look without pause, so the only mode there is is `spin`.
+/// `publish-N` in one regime. The readers look without pause, so the only mode is `spin`.
 pub(crate) fn fan_out(regime: Regime, options: &Options) -> Vec<Group> {
     if !options.modes.contains(&Mode::Spin) {
         return Vec::new();
@@ -68,14 +69,17 @@ pub(crate) fn fan_out(regime: Regime, options: &Options) -> Vec<Group> {
     [1, 8, 64].into_iter().flat_map(sizes).collect()
 }
 
-/// `ring-64` in one regime. The actor sleeps when it is rung, so the only mode there is is `block`.
+/// `ring-64` in one regime. The actor sleeps until it is rung, so the only mode is `block`.
 pub(crate) fn ring(regime: Regime, options: &Options) -> Option<Group> {
     let entry = |label, against| Entry::new(label, Mode::Block, against);
     let notify = |listeners| Job::Notify { listeners };
     let ours = entry("lager/ring", &["iceoryx2/notify", "iceoryx2/notify-1"]);
     let rows = vec![
         (ours, Job::Ring),
-        (entry("iceoryx2/notify", &[]), notify(OBSERVERS + 1)),
+        (
+            entry("iceoryx2/notify", &[]),
+            notify(SensorLine::QOS.observers + 1),
+        ),
         (entry("iceoryx2/notify-1", &[]), notify(1)),
     ];
     let wanted = options.modes.contains(&Mode::Block);

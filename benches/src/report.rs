@@ -1,12 +1,12 @@
-//! What a measurement yields: rows with quantiles and ratios, as a table and as JSON; and the
-//! choices of what is measured.
+//! The result of a measurement (rows with quantiles and ratios, as a table and as JSON), and the
+//! options of a measurement.
 //!
-//! Nothing is measured or decided here; a goal is held by the guard, not by a report.
+//! Nothing here measures or judges. The guard checks limits; a report does not.
 
 use core::fmt;
 
 use clap::ValueEnum;
-use lager_ports::Policy;
+use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
 use crate::stats::Quantiles;
@@ -17,25 +17,25 @@ use crate::stats::Quantiles;
 pub enum Mode {
     /// It looks without pause.
     Spin,
-    /// It looks while samples come fast and sleeps when they do not.
+    /// It looks while samples come fast, and sleeps otherwise.
     Adaptive,
     /// It sleeps until it is woken.
     Block,
 }
 
-/// Under which circumstances the two processes run.
+/// How the two processes share the processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Regime {
-    /// A core each, and an idle core may halt: a sleeping receiver pays for leaving the halt.
+    /// A core each. An idle core may halt, and a sleeping receiver needs time to leave the halt.
     Plain,
-    /// Both on one core: the cost of the software alone.
+    /// Both on one core: the time of the software alone.
     SameCore,
-    /// A core each, kept from halting by a process that runs only when nothing else does.
+    /// A core each, and a process that runs only when nothing else does keeps it from halting.
     NoHalt,
 }
 
-/// Shows choices by the names that they have on the command line, in limits and in JSON.
+/// Shows a value by its name on the command line, in the limits and in JSON.
 macro_rules! shown_by_name {
     ($($choice:ty),*) => {$(
         impl core::fmt::Display for $choice {
@@ -51,7 +51,7 @@ pub(crate) use shown_by_name;
 shown_by_name!(Mode, Regime);
 
 impl Mode {
-    /// What a waiter of the typed ports is told.
+    /// The policy for a waiter of the typed ports.
     pub(crate) const fn policy(self) -> Policy {
         match self {
             Self::Spin => Policy::Spin,
@@ -61,12 +61,12 @@ impl Mode {
     }
 }
 
-/// What to measure, and how thoroughly.
+/// The options of a measurement: what to measure, and how often.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Runs, at least 1; every figure is the median over them.
     pub runs: usize,
-    /// Few samples, for a first look or a check that all works.
+    /// Few samples, for a first look or a check that everything works.
     pub quick: bool,
     /// The modes to measure.
     pub modes: Vec<Mode>,
@@ -86,39 +86,39 @@ impl Default for Options {
     }
 }
 
-/// One figure beside another of the same run.
+/// A row's times divided by those of another row of the same run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
-    /// The label of the row it is compared with; see [`Row::label`].
+    /// The label of the other row; see [`Row::label`].
     pub to: String,
     /// The median over the runs of this row's p50 divided by the other's.
     pub p50: f64,
-    /// The same of the p99.
+    /// The same for the p99.
     pub p99: f64,
-    /// Both of each run, in turn.
+    /// Both ratios of each run.
     #[serde(default)]
     pub runs: Vec<[f64; 2]>,
 }
 
-/// What one contender showed in one mode and regime.
+/// The figures of one carrier in one mode and regime.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// What carried the samples: `lager`, `iceoryx2`, `cacheline`, `futex`, `eventfd`, `pipe`,
+    /// The carrier of the samples: `lager`, `iceoryx2`, `cacheline`, `futex`, `eventfd`, `pipe`,
     /// `uds`, `tcp`, `zenoh`, or `floor` for a chain of several.
     pub name: String,
-    /// Which kind of it, if there are several: `header`, `bare`, `defaults`, …
+    /// The variant of the carrier, if there are several: `header`, `bare`, `defaults`, …
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub variant: String,
-    /// What was timed: `hop`, `hop@10kHz`, `path`, `publish-64`, `ring-64`, …
+    /// The measurement: `hop`, `hop@10kHz`, `path`, `publish-64`, `ring-64`, …
     pub what: String,
     /// How the receiver waited.
     pub mode: Mode,
-    /// Under which circumstances.
+    /// How the two processes shared the processor.
     pub regime: Regime,
-    /// The samples of all runs, and the medians over the runs of each figure.
+    /// The number of samples of all runs, and each figure's median over the runs.
     #[serde(flatten)]
     pub times: Quantiles,
-    /// What it is compared with, the most important first.
+    /// The ratios to other rows, the most important first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ratios: Vec<Ratio>,
     /// Processor time of the measured services per real time, in percent of one core.
@@ -148,8 +148,8 @@ impl Row {
         }
     }
 
-    /// The name by which other rows of the same `what` and regime compare themselves with
-    /// this one: `name`, or `name/variant`.
+    /// The name by which other rows of the same `what` and regime refer to this one: `name`, or
+    /// `name/variant`.
     #[must_use]
     pub fn label(&self) -> String {
         if self.variant.is_empty() {
@@ -160,7 +160,7 @@ impl Row {
     }
 }
 
-/// What a measurement yields.
+/// The result of a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// The machine in one line.
@@ -197,7 +197,7 @@ impl Row {
         let processor = self
             .cpu_percent
             .map(|percent| format!("{percent:.0} % of a core"));
-        // One remark to a line keeps the table within its width.
+        // One remark in each line keeps the table within its width.
         for (index, remark) in ratios.chain(processor).enumerate() {
             if index > 0 {
                 write!(formatter, "\n{:69}", "")?;
@@ -208,7 +208,7 @@ impl Row {
     }
 }
 
-/// Three digits or more of a ratio say nothing more behind the point.
+/// A ratio needs at most three digits.
 fn times(ratio: f64) -> String {
     match ratio {
         large if large >= 100.0 => format!("{large:.0}"),

@@ -1,50 +1,49 @@
-//! What the scenarios send between processes: blocks of words that are checked, and the topics of
-//! the typed ports for them.
+//! The samples that the scenarios send between processes: blocks of words that the receiver checks,
+//! and the topics of the typed ports for them.
 
 use iceoryx2::prelude::ZeroCopySend;
 use lager_ports::Subscriber;
-use lager_topics::{
-    Field, FieldInfo, Make, Payload, Qos, Role, Schema, SensorLine, StructInfo, Topic,
-};
+use lager_sample::{Field, FieldInfo, Make, Payload, Qos, Schema, StructInfo, Topic};
+use lager_topics::{Role, SensorLine};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, broken};
 
-/// A payload of `WORDS` words of eight bytes.
+/// A payload of `WORDS` words of 8 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("lager::bench::Block")]
 pub(crate) struct Block<const WORDS: usize> {
-    /// The first one is the number of the block.
-    #[serde(with = "lager_topics::list")]
+    /// The first word is the number of the block.
+    #[serde(with = "lager_sample::list")]
     pub(crate) words: [u64; WORDS],
 }
 
 /// A payload of 64 bytes.
 pub(crate) type Sample = Block<8>;
 
-/// Bytes of a sample.
+/// The size of a sample in bytes.
 pub(crate) const SIZE: usize = size_of::<Sample>();
 
 impl<const WORDS: usize> Block<WORDS> {
-    /// The block with that number, from which all its words follow.
+    /// The block with that number. All its words follow from the number.
     pub(crate) fn new(number: u64) -> Self {
         Self {
             words: core::array::from_fn(|index| number ^ index as u64),
         }
     }
 
-    /// Which one it is, unique within a measurement.
+    /// The block's number, unique within a measurement.
     pub(crate) const fn number(&self) -> u64 {
         self.words[0]
     }
 
-    /// Whether every word is what [`Block::new`] wrote.
+    /// Whether every word is the one that [`Block::new`] wrote.
     pub(crate) fn is_whole(&self) -> bool {
         *self == Self::new(self.number())
     }
 
-    /// From its bytes ([`lager_topics::bytes_of`]); what is missing of them is 0.
+    /// The block with these bytes ([`lager_sample::bytes_of`]); missing bytes are 0.
     pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
         let mut block = Self::default();
         for (word, bytes) in block.words.iter_mut().zip(bytes.chunks_exact(8)) {
@@ -54,7 +53,7 @@ impl<const WORDS: usize> Block<WORDS> {
     }
 }
 
-// SAFETY: words, of which any bits are one, without padding.
+// SAFETY: it is an array of words without padding, and every bit pattern is a valid word.
 #[allow(unsafe_code)]
 unsafe impl<const WORDS: usize> Field for Block<WORDS> {
     const MAKE: Make = Make::Record(StructInfo::of::<Self>());
@@ -70,7 +69,7 @@ impl<const WORDS: usize> Default for Block<WORDS> {
 
 impl<const WORDS: usize> Schema for Block<WORDS> {
     const TYPE_NAME: &'static str = "lager::bench::Block";
-    // It lives no longer than a measurement, in which all processes are one executable.
+    // All processes of a measurement run the same program, so any constant will do.
     const HASH: u64 = WORDS as u64;
     const FIELDS: &'static [FieldInfo] = &[FieldInfo {
         name: "words",
@@ -90,7 +89,7 @@ impl Topic for Ping {
     const NAME: &'static str = "bench/ping";
     type Payload = Sample;
     const QOS: Qos = Qos {
-        actors: &[RECEIVER],
+        actors: &[RECEIVER.part()],
         ..SensorLine::QOS
     };
     const SUMMARY: &'static str = "From the sender of a measurement to the receiver.";
@@ -103,19 +102,19 @@ impl Topic for Pong {
     const NAME: &'static str = "bench/pong";
     type Payload = Sample;
     const QOS: Qos = Qos {
-        actors: &[SENDER],
+        actors: &[SENDER.part()],
         ..SensorLine::QOS
     };
     const SUMMARY: &'static str = "From the receiver of a measurement back to the sender.";
 }
 
-/// What the sender is on the bus.
+/// The sender's role on the bus.
 pub(crate) const SENDER: Role = Role::Bridge;
 
-/// What the receiver is on the bus.
+/// The receiver's role on the bus.
 pub(crate) const RECEIVER: Role = Role::Logic;
 
-/// Receives all that there is.
+/// Receives and drops all samples in the queue.
 pub(crate) fn drain<T: Topic>(subscriber: &mut Subscriber<T>) -> Result<(), Fault> {
     while subscriber.receive().map_err(broken)?.is_some() {}
     Ok(())
@@ -124,7 +123,7 @@ pub(crate) fn drain<T: Topic>(subscriber: &mut Subscriber<T>) -> Result<(), Faul
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lager_topics::bytes_of;
+    use lager_sample::bytes_of;
 
     #[test]
     fn a_sample_is_the_same_whatever_carried_it_and_a_changed_word_is_noticed() {
@@ -139,7 +138,7 @@ mod tests {
     #[test]
     #[allow(unsafe_code)]
     fn bare_iceoryx2_knows_it_by_the_name_that_the_ports_use() {
-        // SAFETY: it returns a name.
+        // SAFETY: the function only returns a name.
         let bare = unsafe { <Sample as ZeroCopySend>::type_name() };
         assert_eq!(bare, Sample::TYPE_NAME);
     }

@@ -1,4 +1,4 @@
-//! What can be measured, by name: for `lager bench`, the guard and criterion alike.
+//! The timed measurements by name, for `lager bench` and the guard.
 
 use clap::ValueEnum;
 
@@ -8,21 +8,21 @@ use crate::machine;
 use crate::report::{Options, Report, shown_by_name};
 use crate::{hop, path, publish};
 
-/// What is measured by its time.
+/// A timed measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Scenario {
-    /// One way between two processes, and what it costs a writer to wake one.
+    /// One way between two processes, and the time that a writer needs to wake one.
     Hop,
     /// From a sensor frame to the command that it causes.
     Path,
-    /// What publishing costs the writer when many read.
+    /// The time that a writer needs to publish to many subscribers.
     Fanout,
 }
 
 shown_by_name!(Scenario);
 
 impl Scenario {
-    /// The rows that `options` want, in groups that take turns.
+    /// The rows that `options` choose, in groups that take turns.
     #[must_use]
     pub fn groups(self, options: &Options) -> Vec<Group> {
         let of_regime = |regime: &_| match self {
@@ -39,7 +39,7 @@ impl Scenario {
         options.regimes.iter().flat_map(of_regime).collect()
     }
 
-    /// Measures all that `options` want, beside what it is compared with.
+    /// Measures all that `options` choose, beside the baselines.
     ///
     /// # Errors
     /// See [`BenchError`].

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What one run of one contender showed, or the medians of several; times in ns.
+/// The figures of one run of one row, or their medians over several runs; times in ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Quantiles {
-    /// Samples.
+    /// The number of samples.
     pub n: u64,
     /// The median.
     pub p50_ns: u64,
@@ -16,7 +16,7 @@ pub struct Quantiles {
 }
 
 impl Quantiles {
-    /// Of all `samples`, which are sorted meanwhile; `None` if there are none.
+    /// The figures of `samples`, which this sorts; `None` if there are none.
     pub(crate) fn of(samples: &mut [u64]) -> Option<Self> {
         samples.sort_unstable();
         Some(Self {
@@ -27,7 +27,7 @@ impl Quantiles {
         })
     }
 
-    /// The median over runs of each figure, and the samples of all of them; `None` without a run.
+    /// Each figure's median over the runs, and the number of all samples; `None` without a run.
     pub(crate) fn over(runs: &[Self]) -> Option<Self> {
         let middle = |figure: fn(&Self) -> u64| {
             let mut figures: Vec<u64> = runs.iter().map(figure).collect();
@@ -49,7 +49,7 @@ pub(crate) fn at(sorted: &[u64], permille: usize) -> Option<u64> {
     sorted.get(rank.saturating_sub(1)).copied()
 }
 
-/// The median; the mean of the middle two of an even number. `None` of nothing.
+/// The median; the mean of the middle two of an even number. `None` if there is no value.
 #[must_use]
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);

@@ -1,20 +1,22 @@
-//! The steps of the path within one process, each as small as it can be called: criterion times
-//! them, and callgrind counts their instructions.
+//! The steps of the path within one process, each as a function as small as it can be called.
+//! criterion times them, and callgrind counts their instructions.
 //!
-//! The ports are real: members of one bus in this process, typed publisher and subscribers, the
-//! actor's seat taken and awake, so that a ring makes no system call.
+//! The ports are real: members of one bus in this process, a typed publisher and subscribers. The
+//! actor has its seat and is awake, so a ring makes no system call.
 
 use core::time::Duration;
 use std::hint::black_box;
 
 use lager_bridge::arbiter::{Arbiter, Verdict};
+use lager_floor::Heading;
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_ports::{Bus, Policy, Publisher, Subscriber, Waiter, Wake};
+use lager_orders::Mode;
+use lager_ports::{Bus, Publisher, Subscriber};
 use lager_rig::Domain;
 use lager_topics::{
-    MapProduct, Mode, Order, Origin, Phase, Role, SensorLine, Side, SteeringOrder, SteeringReport,
-    WarehouseMap,
+    MapProduct, Order, Origin, Phase, Role, SensorLine, SteeringOrder, SteeringReport, WarehouseMap,
 };
+use lager_wake::{Policy, Waiter, Wake};
 use lager_wire::{
     Centimetres, Decoder, LineState, Packet, PacketId, Payload, SteerCommand, SteerData,
     SteerFlags, Version,
@@ -22,8 +24,8 @@ use lager_wire::{
 
 use crate::slow;
 
-/// A second of what the two boards send: line and distance in turn, and the steering board's
-/// reports, as version-1 packets.
+/// The packets that the two boards send in one second: line and distance in turn, and the steering
+/// board's reports, in version 1.
 #[must_use]
 pub fn a_second_of_packets() -> Vec<Packet> {
     let states = [
@@ -55,7 +57,7 @@ pub fn a_second_of_packets() -> Vec<Packet> {
         .collect()
 }
 
-/// The same as one stream of bytes.
+/// The same packets as one stream of bytes.
 #[must_use]
 pub fn a_second_of_bytes() -> Vec<u8> {
     a_second_of_packets()
@@ -64,7 +66,7 @@ pub fn a_second_of_bytes() -> Vec<u8> {
         .collect()
 }
 
-/// Decodes bytes of version 1; how many packets they are.
+/// Decodes bytes of version 1; returns the number of packets.
 #[inline(always)]
 #[must_use]
 pub fn decode(bytes: &[u8]) -> usize {
@@ -83,21 +85,22 @@ pub fn encode(packets: &[Packet]) {
     }
 }
 
-/// A publisher of line frames, the actor who reads them, and observers, all in this process.
+/// A publisher of line frames, the actor that reads them, and observers, all in this process.
 pub struct Ports {
     publisher: Publisher<SensorLine>,
     subscribers: Vec<Subscriber<SensorLine>>,
     waiter: Waiter,
-    // Dropped after its ports.
+    // The buses are dropped after their ports.
     _buses: [Bus; 3],
     _domain: Domain,
 }
 
 impl Ports {
-    /// With so many subscribers, the first of which acts; all have received before.
+    /// Joins with this number of subscribers, of which the first is the actor. All have received
+    /// before.
     ///
     /// # Panics
-    /// When there is no bus to be had.
+    /// When no bus can be made.
     #[must_use]
     pub fn meet(subscribers: usize) -> Self {
         let domain = Domain::new(crate::FAMILY).expect("a bus");
@@ -114,7 +117,7 @@ impl Ports {
             _buses: buses,
             _domain: domain,
         };
-        // More than any queue holds, so that every queue and every chunk has been used.
+        // More samples than any queue holds, so every queue and every chunk has been used.
         for _ in 0..100 {
             ports.publish();
             assert_eq!(ports.wait(Duration::ZERO), Wake::Rung);
@@ -123,7 +126,7 @@ impl Ports {
         ports
     }
 
-    /// The same after a sample that nobody has received.
+    /// The same with one subscriber and a sample that it has not received.
     #[must_use]
     pub fn published() -> Self {
         let ports = Self::meet(1);
@@ -140,7 +143,7 @@ impl Ports {
         loan.send().unwrap();
     }
 
-    /// Receives as the actor, and gives back.
+    /// Receives a frame as the actor, and returns its memory.
     #[inline(always)]
     pub fn receive(&mut self) -> Option<u32> {
         slow::receive();
@@ -154,7 +157,7 @@ impl Ports {
         self.waiter.wait(black_box(timeout))
     }
 
-    /// Receives all there is, as everybody; how much it was.
+    /// Receives all samples for all subscribers, and returns their number.
     pub fn drain(&mut self) -> usize {
         let mut received = 0;
         for subscriber in &mut self.subscribers {
@@ -180,7 +183,7 @@ pub fn driving() -> Navigator {
         id: 1,
         x: 2,
         y: 0,
-        side: Side::Right.into(),
+        side: Heading::Right.into(),
         ..MapProduct::default()
     };
     let mut navigator = Navigator::new(LogicConfig::default());
@@ -202,7 +205,7 @@ pub fn driving() -> Navigator {
     navigator
 }
 
-/// What a steering board says that has just reported.
+/// A fresh report of a steering board.
 fn report() -> SteeringReport {
     SteeringReport {
         age_ms: 0,
@@ -210,23 +213,23 @@ fn report() -> SteeringReport {
     }
 }
 
-/// Line frames of a second.
+/// The number of line frames in a second.
 pub const FRAMES: u32 = 200;
 
-/// Line frames from one report to the next: as few as keep the robot driving.
+/// Line frames from one report to the next. A longer silence would stop the robot.
 const SILENCE: u32 = 38;
 
-/// That the second was driven, not stood through.
+/// Asserts that the robot drives, so that the second was not one of standing.
 ///
 /// # Panics
-/// When it was not.
+/// When it does not drive.
 pub fn still_driving(navigator: &Navigator) {
     let status = navigator.status();
     assert_eq!(status.phase.get(), Some(Phase::Driving), "{status:?}");
 }
 
-/// Decides on a second of line frames, with the reports that keep the robot driving; `from` is when
-/// it begins.
+/// Decides on the line frames of one second that begins at `from`, with the reports that keep the
+/// robot driving.
 #[inline(always)]
 pub fn navigate(navigator: &mut Navigator, from: Duration) {
     let report = report();
@@ -249,10 +252,10 @@ fn order(id: u32) -> SteeringOrder {
     }
 }
 
-/// An arbiter that carries out one of logic's orders on a board of ours.
+/// An arbiter that carries out one of logic's orders on a board of this project.
 ///
 /// # Panics
-/// When it does not.
+/// When it does not carry it out.
 #[must_use]
 pub fn steering() -> Arbiter {
     let mut arbiter = Arbiter::new();
@@ -265,7 +268,7 @@ pub fn steering() -> Arbiter {
     arbiter
 }
 
-/// Judges a new order, and makes its command.
+/// Judges a new order, and makes the command for it.
 #[inline(always)]
 pub fn arbitrate(arbiter: &mut Arbiter, id: u32) -> Option<SteerCommand> {
     let now = Duration::from_millis(5);

@@ -1,5 +1,5 @@
-//! Times of many repetitions, as people read them: what is measured on a whole robot prints such
-//! rows, `lager bench stop`, `command` and `link` as well as `tests/soak panel`.
+//! The distribution of many repetitions' times, as a row for people. `lager bench stop`, `command`
+//! and `link` print such rows.
 
 use std::fmt;
 
@@ -17,7 +17,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Of these times, in ns.
+    /// The distribution of these times, in ns.
     ///
     /// # Panics
     /// When there are none.
@@ -34,10 +34,10 @@ impl Times {
     }
 }
 
-/// Writes a row for each of `rows`, under a first column's head.
+/// Writes a table with these rows; `head` is the title of the first column.
 ///
 /// # Errors
-/// When they cannot be written.
+/// When the table cannot be written.
 pub fn table(
     formatter: &mut fmt::Formatter<'_>,
     head: &str,

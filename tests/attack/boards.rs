@@ -1,4 +1,4 @@
-//! Boards on a bus of their own, and whether their motors run.
+//! The boards of the attack tests, on a bus of their own, and a thread that watches their motors.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,27 +10,27 @@ use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig};
 use lager_tests::{Cable, Domain, lager, pid, wait_for};
-use lager_topics::{Role, TruthPose};
+use lager_topics::{LAGER, Role, TruthPose};
 use rustix::process::{Signal, kill_process};
 
 /// Boards on a bus of their own, and the cable to the steering board.
 pub(crate) struct Boards {
     bus: PathBuf,
     process: Child,
-    pub(crate) watch: Watch,
+    pub(crate) watch: MotorWatch,
 }
 
-/// A thread that looks at the motors.
-pub(crate) struct Watch {
+/// A thread that watches the motors.
+pub(crate) struct MotorWatch {
     over: Arc<AtomicBool>,
-    /// The longest time between the bridge's last word and a motor that runs, in ns.
+    /// The longest time from the bridge's last bytes until a motor still ran, in ns.
     unsteered_ns: Arc<AtomicU64>,
-    /// Whether a motor runs.
+    /// Whether a motor runs now.
     runs: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Watch {
+impl MotorWatch {
     fn start(bus: &BusConfig, cable: &Arc<Cable>) -> Self {
         let config = bus.clone();
         let cable = Arc::clone(cable);
@@ -46,7 +46,7 @@ impl Watch {
             let bus = Bus::open(&config, Role::Observer).expect("the boards' bus");
             let mut truth = bus.subscriber::<TruthPose>().expect("a topic");
             while !is_over.load(Ordering::Relaxed) {
-                // Before the sample: a word that comes in between cannot make a gap longer.
+                // Read before the sample: bytes that come in between must not shorten the time.
                 let spoken = cable.spoken_ns();
                 if let Some(truth) = truth.latest().expect("readable") {
                     let runs = (truth.left_duty, truth.right_duty) != (0, 0);
@@ -77,7 +77,7 @@ impl Watch {
 }
 
 impl Boards {
-    /// Boards, and in `domain`'s folder the configuration of a robot that is wired to them.
+    /// Starts boards, and writes the configuration of their robot into `domain`'s folder.
     pub(crate) fn start(domain: &Domain) -> Self {
         let file = |name: &str| domain.folder().join(name);
         let [sensor, steering, cable] = ["sensor.tty", "steering.tty", "cable.tty"].map(file);
@@ -107,9 +107,9 @@ impl Boards {
         });
         let config = BusConfig {
             folder: Some(bus.clone()),
-            ..BusConfig::default()
+            ..BusConfig::of(&LAGER)
         };
-        let watch = Watch::start(&config, &cable);
+        let watch = MotorWatch::start(&config, &cable);
         Self {
             bus,
             process,
@@ -128,9 +128,9 @@ impl Drop for Boards {
         let _ = self.process.wait();
         let config = BusConfig {
             folder: Some(self.bus.clone()),
-            ..BusConfig::default()
+            ..BusConfig::of(&LAGER)
         };
-        if let Ok(place) = config.place() {
+        if let Ok(place) = config.home() {
             place.remove();
         }
     }

@@ -1,4 +1,4 @@
-//! A robot whose memory or disk is full.
+//! Attacks that fill the memory or the disk of a robot.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,10 +10,10 @@ use rustix::process::{Signal, kill_process};
 
 use crate::boards::Boards;
 use crate::harm::files;
-use crate::{BACK, Outcome, report};
+use crate::{AttackResult, BACK, report};
 
-/// A robot in a mount namespace of its own: what is filled is full for it alone. Its words go to
-/// `log`, a path below the domain's folder.
+/// A robot in a mount namespace of its own, so that a full disk is full for this robot alone. Its
+/// output goes to `log`, a path below the domain's folder.
 fn in_its_own_mounts(domain: &Domain, log: &str) -> Child {
     let script = r#"
         mount -t tmpfs -o size=24m tmpfs /dev/shm
@@ -33,9 +33,9 @@ fn in_its_own_mounts(domain: &Domain, log: &str) -> Child {
         .expect("`unshare` is there")
 }
 
-/// A command in the mounts of process `robot`; whether it succeeds. Panics if it hangs.
+/// Runs a command in the mounts of `robot`; returns whether it succeeded. Panics if it hangs.
 fn enters(robot: u32, command: &[&str]) -> bool {
-    // As `timeout` has it for what it had to end.
+    // The exit codes of `timeout` for a command that it had to end.
     const ENDED: [i32; 2] = [124, 137];
     let status = Command::new("timeout")
         .args(["-k", "1", "5", "nsenter", "--mount", "--wd", "--target"])
@@ -51,7 +51,7 @@ fn enters(robot: u32, command: &[&str]) -> bool {
     status.success()
 }
 
-/// A process that does nothing in the mounts of another, so that they outlive that one.
+/// A process that does nothing but keep the mounts of another process alive.
 fn stays_in(robot: u32) -> Child {
     Command::new("nsenter")
         .args(["--mount", "--target"])
@@ -68,7 +68,7 @@ fn has_argument(process: u32, wanted: &[u8]) -> bool {
 }
 
 /// Fills `full`, kills the bridge meanwhile, and makes room again.
-fn fill(full: &str, log: &str) -> Outcome {
+fn fill(full: &str, log: &str) -> AttackResult {
     let domain = Domain::new();
     let boards = Boards::start(&domain);
     let mut robot = in_its_own_mounts(&domain, log);
@@ -79,7 +79,7 @@ fn fill(full: &str, log: &str) -> Outcome {
         enters(id, &[&[binary, "--bus", "/dev/shm/bus"], words].concat())
     };
     let answers = || tool(&["topic", "echo", "sensor/line", "--count", "1"]);
-    // Before, its mounts are this process's.
+    // Until `unshare` has become the robot, its mounts are those of this process.
     wait_for("the robot's process", || {
         has_argument(id, b"up").then_some(())
     });
@@ -94,12 +94,12 @@ fn fill(full: &str, log: &str) -> Outcome {
         !enters(id, &["sh", "-c", &all]),
         "there was room for all of it"
     );
-    // Newcomers find no room; who is there drives on.
+    // New processes find no room; the running ones continue.
     let filled = Instant::now();
     while filled.elapsed() < Duration::from_secs(3) {
         answers();
     }
-    // Nor does a killed service's successor.
+    // A killed service's successor finds no room either.
     let services = children(id);
     if let Some(bridge) = services
         .iter()
@@ -142,12 +142,12 @@ fn fill(full: &str, log: &str) -> Outcome {
         &[binary, "--bus", "/dev/shm/bus", "doctor", "--fix"],
     );
     let mut left = files(&memory);
-    // A robot that was stopped stays stopped.
+    // The stop of a stopped robot stays.
     left.retain(|file| !file.ends_with("stop"));
     let _ = witness.kill();
     let _ = witness.wait();
     assert!(left.is_empty(), "{full}: left {left:#?}");
-    Outcome {
+    AttackResult {
         what: format!("{full}, and the bridge killed"),
         said,
         took,

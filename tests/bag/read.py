@@ -1,7 +1,7 @@
-"""Reads a recording with other people's packages, and prints how many messages each topic has,
-and how many samples its writers had numbered up to the last one.
+"""Reads a recording with foreign packages. Prints how many messages each topic has, and how many
+samples its writers had numbered up to the last one.
 
-Every CRC is compared and every message validated against its schema.
+It compares every CRC, and validates every message against its schema.
 """
 
 import collections

@@ -1,26 +1,29 @@
-//! `bag play --verify`: recordings of missions whose navigator is killed, with things in its way,
-//! are proved by a navigator in another process; what is not as it was is named.
+//! Tests of `bag play --verify`. Recordings are of missions with things in the way, whose navigator
+//! is killed. A navigator in another process must repeat each decision; each difference is named.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use lager_journal::{Counts, Damage, EnvelopeSchema, Journal, Learnt, Message, Start, Visit, Walk};
+use lager_journal::{
+    Counts, Damage, EnvelopeSchema, Journal, Learnt, Message, Start, Times, Visit, Walk,
+};
+use lager_sample::{Description, Field, Stamp, Topic, describe};
 use lager_tests::{Domain, Running, pid, wait_for};
-use lager_topics::{MissionEvent, NavInputs, NavStatus, SteeringCommand, Topic};
+use lager_topics::{MissionEvent, NavInputs, NavStatus, SteeringCommand, SteeringReport};
 use rustix::process::{Signal, kill_process};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::{end, recorder, said};
 
-/// How many missions are recorded and proved: 1 in `tests/run`, more in `tests/soak`.
+/// How many missions are recorded and verified: 1 in `tests/run`, more in `tests/soak`.
 fn missions() -> u64 {
     let asked = std::env::var("LAGER_SOAK_VERIFY").ok();
     asked.and_then(|asked| asked.parse().ok()).unwrap_or(1)
 }
 
-/// What `bag play --verify --json` says of a recording, with its exit code.
+/// The output and the exit code of `bag play --verify --json` for a recording.
 fn verified(domain: &Domain, file: &str, with: &[&str]) -> (Value, Option<i32>) {
     let args = [&["bag", "--json", "play", "--verify", file], with].concat();
     let output = domain.run(&args);
@@ -29,8 +32,8 @@ fn verified(domain: &Domain, file: &str, with: &[&str]) -> (Value, Option<i32>) 
     (told, output.status.code())
 }
 
-/// Records missions as [`record_mission`] does until the recorder has missed none of the inputs,
-/// which it does where others keep it from its core. Whatever it has is the same again.
+/// Records missions as [`record_mission`] does until a recording has all of the inputs: a recorder
+/// that others keep from its core misses some. Even then, all that it has must be the same again.
 fn record_all_of_a_mission(domain: &Domain, seed: u64, things: &str, file: &str) -> (Value, u64) {
     for _ in 0..10 {
         let killed = record_mission(domain, seed, things, file);
@@ -61,12 +64,12 @@ fn record_all_of_a_mission(domain: &Domain, seed: u64, things: &str, file: &str)
     panic!("this machine is too busy to record a mission");
 }
 
-/// Records a mission with so many things that come and go, in which logic and bridge are killed in
-/// turn at moments that no two missions share. Returns how often logic was.
+/// Records a mission with `things` things that come and go. Logic and bridge are killed in turn, in
+/// each mission at other moments. Returns the number of kills of logic.
 fn record_mission(domain: &Domain, seed: u64, things: &str, file: &str) -> u64 {
     let recorder = recorder(domain, &[file]);
     let seed_text = seed.to_string();
-    // A robot whose ways are all blocked waits for ten seconds, and not for a minute.
+    // If all its ways are blocked, the robot waits for 10 s instead of a minute.
     let config = domain.folder().join("robot.toml");
     fs::write(&config, "[logic]\ntry_again_s = 10\n").expect("a file");
     let config = config.to_str().expect("a path in UTF-8");
@@ -100,7 +103,7 @@ fn record_mission(domain: &Domain, seed: u64, things: &str, file: &str) -> u64 {
         killed += u64::from(*service == "logic");
     }
     let code = up.wait();
-    // A mission that is given up is as good as one that is delivered, if it can be proved.
+    // A mission that the robot gave up is fine too, if it can be verified.
     assert!(matches!(code, Some(0 | 3)), "{code:?}\n{}", up.log());
     let told = end(recorder);
     println!(
@@ -110,17 +113,17 @@ fn record_mission(domain: &Domain, seed: u64, things: &str, file: &str) -> u64 {
     killed
 }
 
-/// Kills a service of the robot, if it is there.
+/// Kills a service of the robot, if it runs; returns whether it did.
 fn kill(up: &Running, service: &str) -> bool {
     let victim = up.service(service);
     victim.is_some_and(|victim| kill_process(pid(victim), Signal::KILL).is_ok())
 }
 
-/// What is written of a message when a recording is written anew: the same, something else, or
-/// nothing.
+/// A change of a message for [`rewrite`]: it may change the value, and returns whether the message
+/// is written at all.
 type Change<'a> = &'a mut dyn FnMut(&str, &mut Value) -> bool;
 
-/// Writes a recording anew, with changes that the recorder would never make.
+/// Writes a recording again, with changes that a recorder would never make.
 fn rewrite(from: &Path, to: &Path, change: Change<'_>) {
     struct Rewriter<'a> {
         change: Change<'a>,
@@ -164,7 +167,11 @@ fn rewrite(from: &Path, to: &Path, change: Change<'_>) {
     let mut walk = Walk::knowing(Learnt::default());
     walk.feed(&fs::read(from).expect("a readable file"), &mut rewriter);
     walk.finish(&mut rewriter);
-    let mut journal = rewriter.journal;
+    write(rewriter.journal, to);
+}
+
+/// Ends a recording and writes it to the disk.
+fn write(mut journal: Journal, to: &Path) {
     let mut bytes = Vec::new();
     journal.flush().expect("a chunk");
     journal.take(&mut bytes);
@@ -173,17 +180,59 @@ fn rewrite(from: &Path, to: &Path, change: Change<'_>) {
 }
 
 #[test]
+fn a_recording_of_an_older_version_is_read_and_says_that_it_is_one() {
+    // The form of `nav/inputs` at the time when an entry itself described what a person had done.
+    let report = describe(&SteeringReport::MAKE);
+    let before = format!(
+        "ToldInputs{{first:u64,commands:Sent{{epoch:u64,next:u64}},statuses:Sent,events:Sent,\
+         text_left:u32,text_used:u16,text_kind:TextKind<None,Began,Map>,entries_used:u8,\
+         reports_used:u8,reserved:[u8;7],entries:[Told{{time_ns:u64,number:u64,product:i32,\
+         proof:u32,command_id:u32,kind:ToldKind<None,Tick,Line,Distance,Steering,Map,Order,Cancel,\
+         MoveUp,ClearQueue,PickupDone,Pick,DrivenByHand,Reset,Placed,Way,Link,Mode,Renewed,\
+         Repeated,Goods>,value:u8,flag:u8,x:u8,y:u8,heading:Heading<Left,Up,Right,Down>,code:u8,\
+         arm_granted:u8,reserved:[u8;4]}};24],reports:[{report};8],text:[[u8;32];16]}}"
+    );
+    let layout = Description::parse(&before).expect("a layout");
+    assert_eq!(layout.size(), 1992);
+    let mut journal = Journal::begin(&Start::default()).expect("a file");
+    let channel = journal.topic(NavInputs::NAME, &EnvelopeSchema::of(&layout));
+    let channel = channel.expect("a topic");
+    let sample = json!({
+        "stamp": Stamp::default(), "lost": 0, "dropped": 0,
+        "payload": layout.read(&[0; 1992]).expect("a sample"),
+    });
+    let sample = serde_json::to_vec(&sample).expect("JSON");
+    let written = journal.write(channel, Times { log: 1, publish: 1 }, 0, &sample);
+    written.expect("a message");
+    let domain = Domain::new();
+    write(journal, &domain.folder().join("before.mcap"));
+
+    for read in ["info", "check"] {
+        let output = domain.run(&["bag", read, "before.mcap"]);
+        assert!(output.status.success(), "{}", said(&output));
+    }
+    for play in [&["--verify"][..], &["--topic", NavInputs::NAME]] {
+        let output = domain.run(&[&["bag", "play", "before.mcap"], play].concat());
+        let text = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        let older = "nav/inputs was recorded by another version of lager";
+        assert!(text.contains(older), "{text}");
+    }
+    domain.assert_clean();
+}
+
+#[test]
 fn missions_with_kills_and_things_in_the_way_are_identical() {
     let (mut inputs, mut compared, mut unexplained) = (0, 0, 0);
     for seed in 1..=missions() {
         let domain = Domain::new();
         let (told, killed) = record_all_of_a_mission(&domain, seed, "2", "tour.mcap");
-        // What held logic up for too long was restarted as well.
+        // The supervisor also restarts a logic that was held up for too long.
         assert!(told["navigators"].as_u64() > Some(killed), "{told:#}");
         assert!(told["inputs"].as_u64() > Some(1_000), "{told:#}");
         for topic in ["commands", "statuses", "events"] {
             let of = |what: &str| told[topic][what].as_u64().expect("a number");
-            // A busy machine loses some.
+            // A busy machine loses some of the samples.
             assert!(of("same") * 2 > of("sent"), "{topic}: {told:#}");
             compared += of("same");
             unexplained += of("unexplained");
@@ -201,7 +250,7 @@ fn missions_with_kills_and_things_in_the_way_are_identical() {
 #[test]
 fn what_is_not_as_it_was_is_named() {
     let domain = Domain::new();
-    // With nothing in its way it drives, so that it gives orders that could be others.
+    // With nothing in its way it drives, and so gives orders that another constant changes.
     let (told, _) = record_all_of_a_mission(&domain, 77, "0", "tour.mcap");
     let lives = told["navigators"].as_u64().expect("a number");
     let tour = domain.folder().join("tour.mcap");
@@ -228,13 +277,13 @@ fn what_is_not_as_it_was_is_named() {
         command["got"].as_str().expect("a text")
     );
     assert!(text.contains(&expected), "{text}");
-    // The same constant changes nothing, and there is none of another name.
+    // The same value of the constant changes nothing, and an unknown name is refused.
     let (told, code) = verified(&domain, "tour.mcap", &["--with", "sensor_ahead_mm=160.0"]);
     assert_eq!(code, Some(0), "{told:#}");
     let wrong = domain.run(&["bag", "play", "--verify", "tour.mcap", "--with", "sensor=1"]);
     assert_eq!(wrong.status.code(), Some(2), "{}", said(&wrong));
 
-    // One sample of each topic is another one.
+    // Changes one sample of each topic.
     for (topic, field, key) in [
         (SteeringCommand::NAME, "code", "first_command"),
         (NavStatus::NAME, "travelled_mm", "first"),
@@ -258,7 +307,7 @@ fn what_is_not_as_it_was_is_named() {
         assert_ne!(told[key]["expected"], told[key]["got"], "{told:#}");
     }
 
-    // One input is another one, or is missing: what follows is proved from the next navigator on.
+    // One input is changed or removed: only what follows the next navigator's start is proved.
     let mut seen = 0;
     rewrite(&tour, &written, &mut |name, _| {
         seen += u32::from(name == NavInputs::NAME);

@@ -1,8 +1,8 @@
-//! Goods that a person picks up step by step, over the document's language: the robot drives to
+//! Tests goods that a person picks up step by step, in the document's language: the robot drives to
 //! them by itself, asks for one step of the arm after the other, and delivers what is in its claw.
 //!
-//! The test is the external computer. As a person would, it looks at the arm to know which step is
-//! next; what it says is in the document's grammar alone.
+//! The test is the external computer. As a person would, it looks at the arm to choose the next
+//! step, and it speaks the document's grammar alone.
 
 use std::fs;
 use std::io::BufReader;
@@ -16,24 +16,24 @@ use lager_topics::{GoodState, SERVO_UNKNOWN, SteeringState, TruthPose};
 use crate::WAREHOUSE;
 use crate::scene::{Peer, WATCHDOG};
 
-/// Places of the servos in a report.
+/// The indices of the servos in a report.
 const BASE: usize = 0;
 const SHOULDER: usize = 1;
 const ELBOW: usize = 3;
-/// A step is three units of a servo's position, so nothing can be nearer than this.
+/// How near a joint can come: a step is three units of a servo's position.
 const NEAR: i32 = 2;
-/// Where the claw is around goods that stand as they should, and where they are carried.
+/// The arm's positions with the claw around goods in their place, and for carrying them.
 const REACH: (u16, u16) = (311, 488);
 const CARRY: (u16, u16, u16) = (512, 600, 400);
 
-/// The arm as somebody who stands beside it sees it.
+/// The arm as a person beside it sees it.
 struct Arm {
     reports: Subscriber<SteeringState>,
     positions: [u16; 8],
 }
 
 impl Arm {
-    /// Where a servo is, once its report of a step that has ended is there.
+    /// The position of a servo, after its report of the step that has ended.
     fn position(&mut self, servo: usize) -> u16 {
         wait_for("the servo to report", || {
             while let Some(report) = self.reports.receive().expect("readable") {
@@ -48,7 +48,7 @@ impl Arm {
     }
 }
 
-/// The robot, where it asks for steps of its arm.
+/// The robot while it asks for steps of its arm.
 struct Asking {
     robot: Peer<TcpStream>,
     arm: Arm,
@@ -61,9 +61,9 @@ impl Asking {
         assert_eq!(self.robot.waits_for(&["armcomm"]), "armcomm");
     }
 
-    /// Steps a joint until it is there.
+    /// Steps a joint until it is at `to`.
     fn bring(&mut self, servo: usize, [raise, lower]: [&str; 2], to: u16) {
-        // It is not known where a servo is that has not been moved.
+        // No report has the position of a servo before its first step.
         self.step(raise);
         for _ in 0..400 {
             let missing = i32::from(to) - i32::from(self.arm.position(servo));
@@ -76,8 +76,8 @@ impl Asking {
         panic!("servo {servo} does not come to {to}");
     }
 
-    /// Gives an answer that the robot refuses, saying `why`, and asks again. Where logic refuses
-    /// it, the question may come first.
+    /// Gives an answer that the robot refuses with `why`, after which it asks again. If logic
+    /// refuses, the robot may ask before the refusal comes.
     fn is_refused(&mut self, answer: &str, why: &str) {
         self.robot.says(answer);
         let (mut is_told, mut asks) = (false, false);
@@ -128,7 +128,7 @@ fn goods_are_picked_up_by_steps_of_the_arm_and_delivered() {
             "karta" => "karta 2 2 0 0",
             "prodlis" => "prodlis 3 1 0 0 left 2 1 0 down 3 1 1 right",
             "fetchprod" => break,
-            // It may ask before it is switched to autonomous mode.
+            // The robot may ask before it is in autonomous mode.
             _ => continue,
         };
         asking.robot.says(answer);
@@ -136,12 +136,12 @@ fn goods_are_picked_up_by_steps_of_the_arm_and_delivered() {
     asking.robot.says("fetchprod 2");
     assert_eq!(asking.robot.waits_for(&["armcomm"]), "armcomm");
 
-    // What it does not do, and why.
+    // Answers that the robot refuses, with their reasons.
     asking.is_refused("pickup_done", "claw");
     asking.is_refused("armcomm FB", "column 9");
     asking.is_refused("styrcomm 2", "autonomous");
 
-    // Every step there is. The gripper turns there and back, the arm to either side.
+    // Every step that exists. The gripper turns there and back, the arm to either side.
     for step in ["F1", "F2", "F7", "F8"] {
         asking.step(step);
     }
@@ -155,7 +155,7 @@ fn goods_are_picked_up_by_steps_of_the_arm_and_delivered() {
         asking.bring(SHOULDER, ["F5", "F6"], shoulder);
         asking.bring(ELBOW, ["F4", "F3"], elbow);
         asking.bring(BASE, ["F7", "F8"], base);
-        // What is gripped badly slips out within seconds.
+        // Goods that are gripped badly slip out within seconds.
         std::thread::sleep(Duration::from_secs(4));
         let truth = truth.latest().expect("readable").expect("it tells");
         let held = truth.goods.iter().find(|good| good.id == 2);

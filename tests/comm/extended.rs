@@ -1,5 +1,5 @@
-//! A robot and an external computer that speak the extension: what the robot tells, what it does by
-//! actions, and who drives it.
+//! Tests of a robot and an external computer that speak the extension: the robot's reports, its
+//! actions on request, and who drives it.
 
 use std::collections::BTreeMap;
 use std::net::TcpStream;
@@ -9,19 +9,20 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::command::read_wheels;
-use lager_lines::extension::{Action, State};
+use lager_lines::extension::State;
 use lager_lines::secret::Secrets;
+use lager_orders::Action;
 use lager_station::{Handle, Listen, Reply, Server, ServerConfig};
 use lager_tests::wait_for;
 
 use crate::scene::{Peer, Scene, WATCHDOG, answer_to_sign};
 
-/// A station that speaks the extension from its grammar alone, and knows the robot's warehouse.
+/// A station written from the extension's grammar alone; it knows the robot's warehouse.
 struct Station {
     robot: Peer<TcpStream>,
     /// The fields of the robot's last state.
     state: BTreeMap<String, String>,
-    /// Where the robot really is.
+    /// The robot's real place.
     truth: Option<(i32, i32)>,
     number: u32,
 }
@@ -36,7 +37,7 @@ impl Station {
         }
     }
 
-    /// The next line, `None` where the connection has ended. What has an answer is answered.
+    /// The next line; `None` when the connection has ended. Answers the lines that need an answer.
     fn hears(&mut self) -> Option<String> {
         let line = self.robot.hears()?;
         if let Some(answer) = answer_to_sign(&line) {
@@ -65,12 +66,12 @@ impl Station {
         self.state.get(key)?.parse().ok()
     }
 
-    /// Where the robot says that it is.
+    /// The place that the robot reports.
     fn pose(&self) -> Option<(i32, i32)> {
         Some((self.number("x_mm")?, self.number("y_mm")?))
     }
 
-    /// Has something done; the robot's answer, `None` where the connection ends before it.
+    /// Asks for an action; returns the robot's answer, or `None` if the connection ends before it.
     fn asks(&mut self, action: &str) -> Option<Result<(), String>> {
         self.number += 1;
         let number = self.number;
@@ -89,7 +90,7 @@ impl Station {
         }
     }
 
-    /// Hears until a state shows it; whether the connection lasts so long.
+    /// Hears lines until `shown` is true of the state; false if the connection ends before.
     fn hears_until(&mut self, what: &str, shown: impl Fn(&Self) -> bool) -> bool {
         let start = Instant::now();
         while !shown(self) {
@@ -105,8 +106,8 @@ impl Station {
 #[test]
 fn a_station_sees_the_robot_drive_to_what_it_has_ordered() {
     let scene = Scene::new();
-    // A machine that is held up loses the link by hand, and it is made anew; logic knows its map
-    // then.
+    // If the machine is held up, the robot closes the link by hand and connects again. By then
+    // logic knows its map.
     let mut station = loop {
         let mut station = Station::new(scene.robot());
         let is_ready = station.hears_until("it waits for an order", |station| {
@@ -131,7 +132,7 @@ fn a_station_sees_the_robot_drive_to_what_it_has_ordered() {
             .map(|now| (now.0 - x).abs() + (now.1 - y).abs());
         moved.is_some_and(|moved| moved >= 200)
     }));
-    // What it believes is near what is so. It moves a little from one line to the next.
+    // The reported place is near the real one. The robot moves a little between the two lines.
     let ((x, y), (true_x, true_y)) = station.pose().zip(station.truth).expect("both are told");
     let off = (x - true_x).abs().max((y - true_y).abs());
     assert!(off < 150, "({x}, {y}) and ({true_x}, {true_y})");
@@ -142,7 +143,7 @@ fn a_station_sees_the_robot_drive_to_what_it_has_ordered() {
         }
     };
     assert!(event.ends_with(" 4 1"), "{event}");
-    // Real boards, as far as it knows: a person picks.
+    // With what seem to be real boards, the robot waits for a person to pick.
     assert_eq!(station.asks("picked force"), Some(Ok(())));
     assert!(station.hears_until("it leaves the goods", |station| {
         station
@@ -155,10 +156,10 @@ fn a_station_sees_the_robot_drive_to_what_it_has_ordered() {
 #[test]
 fn a_drive_that_nobody_renews_ends_while_the_link_lasts() {
     let mut scene = Scene::new();
-    // A machine that is held up ends a drive, or the link; then once more.
+    // If the machine is held up, the drive or the link ends, and the test tries again.
     'connected: loop {
         let mut station = Station::new(scene.robot());
-        // By then it knows that the extension is spoken.
+        // When a state comes, the station knows that the robot speaks the extension.
         if !station.hears_until("a state", |station| !station.state.is_empty()) {
             continue;
         }
@@ -168,7 +169,7 @@ fn a_drive_that_nobody_renews_ends_while_the_link_lasts() {
                 continue 'connected;
             }
         }
-        // Renewed it goes on, without a new command.
+        // While it is renewed, it goes on without a new command.
         let (since, mut renewed) = (Instant::now(), 0);
         while since.elapsed() < Duration::from_millis(500) {
             match station.asks("drive 2 150") {
@@ -177,7 +178,7 @@ fn a_drive_that_nobody_renews_ends_while_the_link_lasts() {
             }
         }
         assert!(renewed > 0, "it was never renewed");
-        // From here on it is not, and the sign of life is answered as before.
+        // From here on nobody renews it, and the station still answers the sign of life.
         if station.hears_until("it stands", |station| !turn(station)) {
             assert_eq!(station.number("stopped"), Some(0), "it was not stopped");
             break;
@@ -217,7 +218,7 @@ impl Served {
         }
     }
 
-    /// The robot's last state, if it has come just now.
+    /// The robot's last state, if it is fresh.
     pub(crate) fn state(&self) -> Option<State> {
         let view = self.handle.robots().pop()?;
         let state = view.shown.state?;
@@ -244,7 +245,7 @@ fn one_drives_a_second_is_refused_and_anybody_stops() {
 
     let forward = read_wheels("2").expect("a code");
     wait_for("the wheels to turn", || {
-        // It may be away for a moment on a machine that is held up.
+        // On a machine that is held up, the robot may be away for a moment.
         let _ = anna.drive(forward);
         std::thread::sleep(Duration::from_millis(50));
         station.state().filter(|state| state.left_duty > Some(0))
@@ -268,7 +269,7 @@ fn one_drives_a_second_is_refused_and_anybody_stops() {
     let Reply::Refused(why) = refused else {
         panic!("{refused:?}: it is stopped");
     };
-    assert!(why.as_str().contains("resume"), "{why}");
+    assert!(why.to_string().contains("stopped"), "{why}");
     wait_for("the stop to be released", || {
         let stop = station.state()?.stop?;
         let resumed = handle.act(&robot, Action::Resume { stop }).ok()?;

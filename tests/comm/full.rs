@@ -1,4 +1,4 @@
-//! A station whose disk is full: it goes on answering, says that nothing is saved, keeps the file
+//! Tests a station whose disk is full: it still answers, says that nothing is saved, keeps the file
 //! as it was, and saves when there is room again.
 
 use std::fs;
@@ -13,7 +13,7 @@ use lager_tests::{Domain, lager, wait_for};
 use crate::WAREHOUSE;
 use crate::scene::{Peer, WATCHDOG};
 
-/// A process that ends with the test.
+/// A process that is killed when the test ends.
 struct Ends(Child);
 
 impl Drop for Ends {
@@ -29,7 +29,7 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
     let here = domain.folder();
     fs::write(here.join("warehouse.toml"), WAREHOUSE).expect("a file");
     fs::create_dir(here.join("disk")).expect("a folder");
-    // A disk of its own, which what is in the way fills but for the file that is there.
+    // A separate disk. A large file fills it, except for the room of the warehouse's file.
     let script = "mount -t tmpfs -o size=64k none disk && cp warehouse.toml disk/ || exit 99; \
                   cat /dev/zero >disk/in-the-way 2>/dev/null; exec \"$@\"";
     let out = |name: &str| fs::File::create(here.join(name)).expect("a file");
@@ -53,8 +53,9 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
         let address = said.strip_prefix("robots connect to ")?.split(',').next()?;
         said.contains('\n').then(|| address.to_owned())
     });
-    let robot = TcpStream::connect(address).expect("it listens");
+    // GaG first: without one the station would answer the robot from its file.
     let gag = UnixStream::connect(here.join("gag")).expect("it listens");
+    let robot = TcpStream::connect(address).expect("it listens");
     robot.set_read_timeout(Some(WATCHDOG)).expect("a socket");
     gag.set_read_timeout(Some(WATCHDOG)).expect("a socket");
     let (mut robot, mut gag) = (Peer(BufReader::new(robot)), Peer(BufReader::new(gag)));
@@ -65,8 +66,8 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
         gag.says(answer);
         assert_eq!(robot.waits_for(&[question]), answer);
     };
-    // A warehouse is taken up when all of it has been said.
-    for answer in ["karta 2 2 0 0", "prodlis 1 7 0 0 left", "sidelength 35"] {
+    // The station uses a warehouse when it has heard all parts of it.
+    for answer in ["karta 2 2 0 0", "prodlis 1 7 0 0 left", "sidelength 45"] {
         describes(answer);
     }
     let told = wait_for("it to say that nothing is saved", || {
@@ -74,7 +75,7 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
         told.contains("No space left").then_some(told)
     });
     assert!(told.contains("disk/warehouse.toml"), "{told}");
-    // As that process sees it; nobody else sees this disk.
+    // The disk by its path in that process, which alone can see it.
     let disk = format!(
         "/proc/{}/root{}",
         station.0.id(),
@@ -86,11 +87,11 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
 
     fs::remove_file(disk.join("in-the-way")).expect("a file");
     wait_for("the warehouse to be saved", || {
-        saved().contains("side_length_cm = 35").then_some(())
+        saved().contains("side_length_cm = 45").then_some(())
     });
-    describes("sidelength 36");
+    describes("sidelength 46");
     wait_for("the next one to be saved", || {
-        saved().contains("side_length_cm = 36").then_some(())
+        saved().contains("side_length_cm = 46").then_some(())
     });
     let left: Vec<_> = fs::read_dir(disk).expect("a folder").flatten().collect();
     assert!(left.len() <= 2, "{left:?}");

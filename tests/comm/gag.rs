@@ -1,4 +1,4 @@
-//! `lager gag` at the station that `lager up` starts where it is told to, and a GaG that goes away.
+//! Tests of `lager gag` at the station that `lager up` starts, and of a GaG that disconnects.
 
 use std::io::{BufReader, Write};
 use std::net::TcpStream;
@@ -44,12 +44,12 @@ fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
         .spawn()
         .expect("lager starts");
     let mut person = gag.stdin.take().expect("a pipe");
-    // The first is no answer, the second waits until the robot asks.
+    // The first line is no valid answer; the second one waits until the robot asks.
     person
         .write_all(b"fetchprod two\nfetchprod 2\n")
         .expect("a pipe");
     drop(person);
-    // It waits for as long as its robot does not ask.
+    // The GaG waits until the robot has asked, and then ends.
     wait_for("the GaG to end", || gag.try_wait().expect("a child"));
     let ended = gag.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&ended.stdout).into_owned();
@@ -134,10 +134,10 @@ fn a_robot_stands_when_the_gag_that_drives_it_has_gone() {
             _ => "styrcomm 2",
         };
         driver.says(answer);
-        // The wheels begin to turn in a moment.
+        // The wheels need a moment to start.
         std::thread::sleep(Duration::from_millis(50));
     }
-    // The link between station and robot stays as it is.
+    // The link between station and robot stays open.
     drop(driver);
     scene.wait_until_it_stands();
     let place = scene.place();

@@ -1,5 +1,5 @@
-//! A bridge that is killed, or frozen and replaced, while somebody's order is in force: its
-//! successor turns no wheel by that order, and whoever gave it is told.
+//! Tests with a bridge that is killed, or frozen and replaced, while a person's order is in force:
+//! its successor turns no wheel by that order, and the person is told.
 
 use std::time::{Duration, Instant};
 
@@ -9,15 +9,15 @@ use rustix::process::{Signal, kill_process};
 
 use crate::scene::Scene;
 
-/// How long the successor is watched once it has the board.
+/// How long the test watches the successor after it has the board.
 const AFTER: Duration = Duration::from_millis(1_500);
 
-/// What ends a bridge. One that is stopped is found silent and replaced.
+/// The signals that end a bridge. A stopped bridge is silent, and the supervisor replaces it.
 const ENDS: [Signal; 2] = [Signal::KILL, Signal::STOP];
 
-/// Sends the bridge of a robot that drives a signal, and watches until its successor has had the
-/// board for a while. Wheels that have stood do not turn again; whether they have stood, which they
-/// need not where the successor was there within the lease.
+/// Sends `signal` to the bridge of a robot that drives, and watches until its successor has had the
+/// board for a while. Wheels that stand must not turn again. Returns whether they stood; they need
+/// not if the successor came within the lease.
 fn replace_bridge(scene: &mut Scene, signal: Signal) -> bool {
     let bus = scene.domain.observe("r1", 1.0);
     let mut health = bus.subscriber::<LinkHealth>().expect("a topic");
@@ -54,7 +54,7 @@ fn a_gags_command_moves_nothing_after_the_death_of_the_bridge() {
     for signal in ENDS {
         let mut robot = scene.drive(false);
         if replace_bridge(&mut scene, signal) {
-            // It is told why, and asked for another one.
+            // The station is told the reason, and is asked for another command.
             let told = wait_for("it to be told", || {
                 robot.hears().filter(|line| line.starts_with("thought"))
             });
@@ -70,7 +70,7 @@ fn a_gags_command_moves_nothing_after_the_death_of_the_bridge() {
 fn lager_drive_moves_nothing_after_the_death_of_the_bridge() {
     let mut scene = Scene::new();
     for signal in ENDS {
-        // A command that was held up on this machine is given anew.
+        // If this machine was held up, the command ended and is given again.
         let mut drive = wait_for("the robot to drive", || {
             let mut drive = scene.domain.start(&["drive", "left", "--seconds", "120"]);
             loop {

@@ -1,5 +1,5 @@
-//! Processes that freeze for a while with somebody's order before them: it moves nothing later, and
-//! whoever gave it is told.
+//! Tests with processes that freeze for a while with an order in their input: the order moves
+//! nothing later, and its giver is told.
 
 use std::io::BufReader;
 use std::os::unix::net::UnixStream;
@@ -7,7 +7,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
-use lager_lines::extension::{Action, State};
+use lager_lines::extension::State;
+use lager_orders::Action;
 use lager_station::Reply;
 use lager_tests::{pid, wait_for};
 use lager_topics::LinkHealth;
@@ -19,10 +20,10 @@ use crate::station_at;
 
 /// How long a process is frozen.
 const FROZEN: Duration = Duration::from_millis(1_000);
-/// How long nothing may move after that.
+/// How long the test watches after that, while nothing may move.
 const AFTER: Duration = Duration::from_millis(700);
 
-/// A process of the test's, which goes on when the test ends, however it does.
+/// A frozen process; it runs again when this is dropped, whether the test passes or fails.
 struct Frozen(u32);
 
 impl Frozen {
@@ -63,7 +64,7 @@ fn a_resume_that_comm_finds_when_it_thaws_releases_no_stop() {
             panic!("the robot is connected");
         };
         if is_stopped_again {
-            // By a person beside the robot, who sees it stand.
+            // A person beside the robot gives this stop, and sees the robot stand.
             scene.domain.done(&["stop"]);
         }
         std::thread::sleep(FROZEN);
@@ -81,7 +82,7 @@ fn a_resume_that_comm_finds_when_it_thaws_releases_no_stop() {
             std::thread::sleep(Duration::from_millis(5));
         }
     }
-    // Given anew, with the stop that is shown, it is done.
+    // A new request, which names the stop that the station shows, succeeds.
     wait_for("the stop to be released", || {
         let stop = station.state()?.stop?;
         let resumed = station.handle.act(&robot, Action::Resume { stop }).ok()?;
@@ -89,7 +90,7 @@ fn a_resume_that_comm_finds_when_it_thaws_releases_no_stop() {
     });
 }
 
-/// A GaG at this socket.
+/// A GaG connected to this socket.
 fn gag(socket: &Path) -> Peer<UnixStream> {
     let stream = UnixStream::connect(socket).expect("it listens");
     stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
@@ -133,11 +134,11 @@ fn a_gag_that_freezes_while_it_drives_makes_the_robot_stand_and_learns_why() {
         assert!(start.elapsed() < WATCHDOG, "the robot does not drive");
         if gag.waits_for(&["sidelength", "karta", "prodlis", "styrcomm"]) == "styrcomm" {
             gag.says("styrcomm 6");
-            // The wheels begin to turn in a moment.
+            // The wheels need a moment to start.
             std::thread::sleep(Duration::from_millis(50));
         }
     }
-    // From here on it reads nothing, and its connection stays as it is.
+    // From here on the peer reads nothing, but its connection stays open.
     scene.wait_until_it_stands();
     scene.assert_it_stays(AFTER);
     let why = loop {

@@ -1,4 +1,4 @@
-//! A robot that drives by itself and loses its station.
+//! Tests of a robot that drives by itself when it loses its station.
 
 use std::fs;
 
@@ -10,10 +10,10 @@ use crate::station_at;
 
 /// The side of a square of the warehouse, in mm.
 const SIDE_MM: f64 = 500.0;
-/// How far from a crossing the middle of the axle may stand, in mm.
+/// The longest distance between a crossing and the middle of the axle "at" it, in mm.
 const AT_CROSSING_MM: f64 = 30.0;
 
-/// A robot on its way to product 1, whose station has just been killed, and where that was.
+/// A robot on its way to product 1 whose station was killed, and the station's address.
 fn robot_without_station(domain: &Domain, link_lost: &str) -> (Running, String) {
     let (mut station, address) = station_at(domain, "127.0.0.1:0", &[]);
     let config = domain.folder().join("lager.toml");
@@ -70,7 +70,7 @@ fn a_robot_that_stands_ends_the_edge_and_goes_on_when_the_station_is_back() {
         let truth = wait_for("the truth", || truth.receive().expect("readable"));
         stood = match (truth.left_duty, truth.right_duty) {
             (0, 0) => stood + 1,
-            // It may still be on its way to standing, but not for ever.
+            // The robot may still be braking, but not for ever.
             _ => 0,
         };
         let off = [truth.x_mm, truth.y_mm].map(|mm| (mm / SIDE_MM - (mm / SIDE_MM).round()).abs());
@@ -83,7 +83,7 @@ fn a_robot_that_stands_ends_the_edge_and_goes_on_when_the_station_is_back() {
     drop(status);
     assert!(!up.output().contains("DELIVERED"), "{}", up.output());
 
-    // Neither a new comm nor a new navigator sets it off, but the station does.
+    // The robot starts again neither by a new comm nor by a new navigator, but by the station.
     for service in ["comm", "logic"] {
         let process = up.service(service).expect("it runs");
         rustix::process::kill_process(lager_tests::pid(process), Signal::KILL).expect("it runs");

@@ -1,6 +1,7 @@
-//! The robot and the external computer as processes. The test plays either side and shares no code
-//! with them: it follows the grammar alone.
+//! Tests of the robot and the external computer as processes. The test plays either side and shares
+//! no code with them: it follows the grammar alone.
 
+mod answers_at_once;
 mod bad;
 mod by_arm;
 mod extended;
@@ -9,7 +10,6 @@ mod gag;
 mod heir;
 mod late;
 mod lost;
-mod pace;
 mod peers;
 mod proved;
 mod scene;
@@ -40,7 +40,7 @@ fn a_cut_link_makes_the_robot_stand_and_it_connects_again() {
 fn a_station_that_falls_silent_makes_the_robot_stand() {
     let mut scene = Scene::new();
     let mut robot = scene.drive(true);
-    // From here on nothing is said, and the connection stays as it is.
+    // From here on the peer says nothing, but the connection stays open.
     scene.wait_until_it_stands();
     while robot.hears().is_some() {}
     let mut robot = scene.robot();
@@ -62,8 +62,8 @@ fn a_comm_that_is_killed_makes_the_robot_stand_and_its_successor_asks_again() {
 #[test]
 fn a_stop_is_confirmed_and_stays() {
     let mut scene = Scene::new();
-    // A machine that is held up loses the link, which makes the robot stand as well; then once
-    // more.
+    // If the machine is held up, the robot loses the link and stands for that reason; then the test
+    // tries again.
     let (mut robot, stopped) = loop {
         let mut robot = scene.drive(true);
         robot.says("stop 7");
@@ -77,16 +77,16 @@ fn a_stop_is_confirmed_and_stays() {
     let why = loop {
         robot.says("styrcomm 2");
         let line = robot.hears_answering(&["thought forward is not possible now", "styrcomm"]);
-        // It had asked for its warehouse when the command came.
+        // The robot had asked for its warehouse before the command came.
         if line.as_deref() != Some("styrcomm") {
             break line;
         }
     };
-    assert!(why.is_none_or(|why| why.contains("`lager resume`")));
+    assert!(why.is_none_or(|why| why.contains("the robot is stopped")));
     assert_eq!(scene.duties().unwrap_or_default(), (0, 0));
 }
 
-/// A warehouse that robot and station read from one file.
+/// A file with the warehouse of robot and station.
 pub(crate) const WAREHOUSE: &str = "size = [2, 2]
 side_length_cm = 50
 
@@ -153,7 +153,7 @@ fn a_gag_at_a_station_has_goods_fetched() {
     let stream = UnixStream::connect(&gag).expect("it listens");
     stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
     let mut gag = Peer(BufReader::new(stream));
-    // The station had answered by itself what was asked before the GaG came.
+    // Before the GaG came, the station had answered the robot's questions by itself.
     let mut fetches = |product| loop {
         let questions = ["sidelength", "karta", "prodlis", "armcomm", "fetchprod"];
         let answer = match gag.waits_for(&questions).as_str() {
@@ -177,14 +177,14 @@ fn a_gag_at_a_station_has_goods_fetched() {
         let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
         listed.contains("product 3").then_some(())
     });
-    // Over the death of comm the order stays, and the next question comes after its delivery.
+    // The order survives the death of comm; the robot asks again after its delivery.
     let comm = up.service("comm").expect("it runs");
     kill_process(pid(comm), Signal::KILL).expect("it runs");
     delivered(3);
     fetches(1);
 }
 
-/// A station of its own for robots that are told where it is.
+/// A station of its own, for robots that are told its address.
 fn station(domain: &Domain, fetch: &[&str]) -> (Running, String) {
     station_at(domain, "127.0.0.1:0", fetch)
 }
@@ -234,15 +234,15 @@ fn two_robots_of_one_station_deliver_though_both_are_killed() {
     wait_for("both to be under way", || {
         (said(&first, "drives from") && said(&second, "drives from")).then_some(())
     });
-    // Both at once.
+    // Both robots have orders at the same time.
     assert!(!said(&first, "DELIVERED") && !said(&second, "DELIVERED"));
-    // All of one robot that talks, and what moves it.
+    // Kills the services of one robot that talk to the station and move it.
     for service in ["comm", "bridge", "logic"] {
         let process = first.service(service).expect("it runs");
         kill_process(pid(process), Signal::KILL).expect("it runs");
     }
-    // All of the other. It begins anew at the place of delivery, with what the station has not yet
-    // told it.
+    // Kills all of the other robot. It starts again at the place of delivery, and the station gives
+    // it the orders that it has not given yet.
     kill_process(pid(second.pid()), Signal::KILL).expect("it runs");
     second.wait();
     let second = robot("r2");
@@ -277,14 +277,14 @@ fn a_second_robot_joins_the_station_of_the_first_or_says_why_not() {
     assert!(told.contains("listens at 127.0.0.1:"), "{told}");
     let has_usual = told.contains("listens at 127.0.0.1:7420");
     let (second, told) = up("r2", "small");
-    // Where somebody else has the usual port, each has a station of its own.
+    // If another program has the usual port, each robot has a station of its own.
     assert_eq!(told.contains("that of robot `r1`"), has_usual, "{told}");
     assert_eq!(second.service("station").is_none(), has_usual);
     let (third, told) = up("r3", "curved");
-    let has_own = told.contains("since 127.0.0.1:7420 cannot be had");
+    let has_own = told.contains("since 127.0.0.1:7420 is not free");
     assert!(has_own || !has_usual, "{told}");
 
-    // A station that is killed has a successor at the same place.
+    // A killed station has a successor at the same address.
     let station = first.service("station").expect("it runs");
     kill_process(pid(station), Signal::KILL).expect("it runs");
     wait_for("its successor", || {

@@ -1,29 +1,29 @@
 """Plays a transcript against `lager station` or `lager comm`.
 
-Written from the grammar of the document alone (G1-G10): it shares no code with the programs it talks
-to, and uses nothing but Python's own library. Every line that it hears must be one of that grammar.
+Written from the document's grammar alone (G1-G10): it shares no code with the programs it talks to,
+and uses only Python's own library. Every line that it hears must be one of that grammar.
 
-    peers.py TRANSCRIPT --robot HOST:PORT --gag SOCKET     a robot and a GaG, of a station
-    peers.py TRANSCRIPT --robert                           a Robert, of a robot
+    peers.py TRANSCRIPT --robot HOST:PORT --gag SOCKET     plays a robot and a GaG at a station
+    peers.py TRANSCRIPT --robert                           plays a Robert for a robot
 
-A Robert prints its address, and begins when it is told a line. A transcript has a step on each line:
+A Robert prints its address, and begins when it reads a line. A transcript has a step on each line:
 
     # a remark
     robot connects            robert: the next robot has connected
-    robot > karta             it says this line
-    robot > 32 times karta    it says it so often, without waiting for answers
+    robot > karta             the peer sends this line
+    robot > 32 times karta    it sends the line so often, without waiting for answers
     robot >> karta            the same, with CR before LF
-    robot ~ kar               it says these bytes; the line is not over
-    robot < karta 2 2 0 0     it hears this next; `*` at the end stands for anything
+    robot ~ kar               it sends these bytes without the end of the line
+    robot < karta 2 2 0 0     it hears this next; `*` at the end stands for any text
     robot < 2 times karta 1*  it hears that so often
     robot hears nothing       for half a second
-    robot passes over karta   from now on, where it waits for another line
+    robot passes over karta   from now on, it skips such lines while it waits for others
     robot is closed           by the other side
     robot leaves              it closes its connection
-    pause 0.3                 nobody says anything for so many seconds
+    pause 0.3                 nobody sends anything for this time, in s
 
-Telemetry and what is no question of the document may come at any time, so a peer that waits for
-another line passes over it.
+Telemetry and lines that are no question of the document may come at any time, so a peer that waits
+for another line skips them.
 """
 
 import re
@@ -42,7 +42,7 @@ QUERY = "sidelength|karta|prodlist?|fetchprod|armcomm|styrcomm"
 COMMAND = r"armcomm 1111\d{4}|styrcomm 0000\d{4}"
 PRODUCTS = rf"prodlist? {INT}( {INT} {COORD} {DIRECTION})*"
 ANSWER = rf"sidelength {INT}|karta {COORD} {COORD}|{PRODUCTS}|fetchprod {INT}|{COMMAND}|pickup_done"
-# What each of them may hear. A robot's first line is no word of the document, and is ignored.
+# The lines that each peer may hear. A robot's first line is outside the document and is ignored.
 HEARS = {
     "robot": ANSWER,
     "gag": f"{QUERY}|{TELEMETRY}",
@@ -52,7 +52,7 @@ PASSED_OVER = ("thought ", "set_robot ", "set_heading ", "lager ")
 
 
 class Peer:
-    """One end of a conversation in lines."""
+    """One end of a connection that carries lines."""
 
     def __init__(self, name, connect):
         self.name, self.connect = name, connect
@@ -72,7 +72,7 @@ class Peer:
         self.stream.sendall(text.encode())
 
     def hears(self, patience):
-        """The next line; None where the conversation is over."""
+        """The next line; None when the connection has ended."""
         until = time.monotonic() + patience
         while b"\n" not in self.unread:
             self.stream.settimeout(max(until - time.monotonic(), 0.001))
@@ -173,7 +173,7 @@ def main(transcript, *flags):
             "gag": Peer("gag", unix(flags["--gag"])),
         }
     for number, line in enumerate(open(transcript, encoding="utf-8"), 1):
-        # Blanks at the end would be part of what is said.
+        # Blanks at the end would be part of the line that is sent.
         step = line.rstrip("\n")
         if step.strip() and not step.startswith("#"):
             print(f"{number:4} {step}", flush=True)

@@ -1,10 +1,9 @@
-//! Peers that were written from the document's grammar alone, in another language: a GaG, a robot
-//! and a Robert of strangers (`peers.py`). What they say and must hear stands in the transcripts
-//! beside it.
+//! Tests with peers that were written from the document's grammar alone, in another language: a
+//! stranger's GaG, robot and Robert (`peers.py`). The transcripts beside it have what they say and
+//! must hear.
 
 use std::fs::{self, File};
 use std::io::Write;
-use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use lager_tests::{Domain, Running, wait_for};
@@ -20,7 +19,7 @@ struct Played {
 
 impl Played {
     fn new(domain: &Domain, transcript: &str, flags: &[&str]) -> Self {
-        let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("comm");
+        let here = lager_tests::in_tree("tests/comm");
         let folder = domain.folder().to_owned();
         let output = |name: &str| File::create(folder.join(name)).expect("a file");
         let child = Command::new("python3")
@@ -35,7 +34,7 @@ impl Played {
         Self { child, folder }
     }
 
-    /// A Robert, and where a robot finds it.
+    /// A Robert, and the address to which a robot connects.
     fn robert(domain: &Domain, transcript: &str) -> (Self, String) {
         let played = Self::new(domain, transcript, &["--robert"]);
         let address = wait_for("it to listen", || {
@@ -95,10 +94,10 @@ fn a_robot_and_a_gag_of_strangers_hold_a_whole_session_at_a_station() {
     ]);
     let address = listens_at(&station);
     Played::new(&domain, "station.txt", &["--robot", &address, "--gag", gag]).ends_well();
-    // What GaG has described outlives the station.
+    // The warehouse that the GaG has described outlives the station.
     drop(station);
     let saved = fs::read_to_string(&file).expect("a file");
-    assert!(saved.contains("side_length_cm = 35"), "{saved}");
+    assert!(saved.contains("side_length_cm = 45"), "{saved}");
     assert!(
         saved.contains("id = 7") && !saved.contains("id = 1"),
         "{saved}"

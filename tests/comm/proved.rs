@@ -1,4 +1,4 @@
-//! Who says that he is a robot, or its station, and whether he is.
+//! Tests that a robot and its station prove to each other who they are, with a shared secret.
 
 use std::fs;
 use std::io::{BufReader, Read as _, Write as _};
@@ -18,7 +18,7 @@ use crate::scene::{Peer, WATCHDOG};
 
 const SECRET: &str = "correct-horse-battery-staple";
 
-/// A file with this text and these rights.
+/// A file with this text and these permissions.
 fn file(domain: &Domain, text: &str, mode: u32) -> PathBuf {
     let path = domain.folder().join("secret");
     fs::write(&path, text).expect("a file");
@@ -31,7 +31,7 @@ fn connected(stream: TcpStream) -> Peer<TcpStream> {
     Peer(BufReader::new(stream))
 }
 
-/// A robot that connects to `station`, with this file of secrets.
+/// A robot that connects to `station` and reads its secret from this file.
 fn robot(domain: &Domain, station: &str, secret: &std::path::Path) -> Running {
     let secret = secret.to_str().expect("UTF-8");
     domain.start(&["up", "--headless", "--station", station, "--secret", secret])
@@ -73,7 +73,7 @@ fn an_impostor_of_a_robot_that_is_up_is_refused_and_both_sides_are_told() {
             .then_some(())
     });
 
-    // Another robot of this user's is told where the secret lies.
+    // Another robot of the same user gets the path of the secret.
     let args = [
         "--name",
         "r2",
@@ -118,7 +118,7 @@ fn a_robot_and_a_station_with_one_secret_find_each_other_and_with_two_they_say_w
         wrong.log().contains("does not prove it").then_some(())
     });
     assert_eq!(handle.robots(), []);
-    // It is read for each connection.
+    // The station reads the file for each connection.
     file(&domain, &format!("r1 {SECRET}\n"), 0o600);
     wait_for("the station to know the robot", || {
         let robots = handle.robots();
@@ -217,7 +217,7 @@ fn a_station_without_files_to_open_says_so_once_and_takes_robots_when_it_has_som
     domain.assert_clean();
 }
 
-/// The status of the answer to `GET path` of the panel at `host`; `None` while nobody answers.
+/// The status of the answer to `GET path` of the panel at `host`; `None` without an answer.
 fn asked(host: &str, path: &str) -> Option<String> {
     let mut stream = TcpStream::connect(host).ok()?;
     stream.set_read_timeout(Some(WATCHDOG)).ok()?;

@@ -1,4 +1,4 @@
-//! A robot that is up, in manual mode, with an external computer that the test plays.
+//! The scene of these tests: a robot in manual mode, whose external computer the test plays.
 
 use std::fs;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
@@ -9,14 +9,14 @@ use lager_ports::Subscriber;
 use lager_tests::{Domain, Running, wait_for};
 use lager_topics::{LinkHealth, TruthPose};
 
-/// How long a line is waited for before the test has failed.
+/// How long a test waits for a line before it fails.
 pub(crate) const WATCHDOG: Duration = Duration::from_secs(120);
 
-/// One end of a conversation in lines.
+/// One end of a connection that carries lines.
 pub(crate) struct Peer<S>(pub(crate) BufReader<S>);
 
 impl<S: Read + Write> Peer<S> {
-    /// The next line without its end; `None` where the conversation is over.
+    /// The next line without its end; `None` when the connection has ended.
     pub(crate) fn hears(&mut self) -> Option<String> {
         let mut line = String::new();
         match self.0.read_line(&mut line) {
@@ -27,7 +27,7 @@ impl<S: Read + Write> Peer<S> {
         }
     }
 
-    /// The next line that begins with one of `words`; what it passes over needs no answer.
+    /// The next line that begins with one of `words`; skips lines that need no answer.
     pub(crate) fn waits_for(&mut self, words: &[&str]) -> String {
         loop {
             let line = self.hears().expect("the conversation goes on");
@@ -42,15 +42,15 @@ impl<S: Read + Write> Peer<S> {
         }
     }
 
-    /// Says a line; a peer that has gone meanwhile is no failure.
+    /// Sends a line; the peer may have gone meanwhile.
     pub(crate) fn says(&mut self, line: &str) {
         let _ = self.0.get_mut().write_all(format!("{line}\n").as_bytes());
     }
 }
 
 impl Peer<TcpStream> {
-    /// The next line that begins with one of `words`, if the connection lasts so long. The sign of
-    /// life is answered.
+    /// The next line that begins with one of `words`; `None` if the connection ends before. Answers
+    /// the sign of life.
     pub(crate) fn hears_answering(&mut self, words: &[&str]) -> Option<String> {
         loop {
             let line = self.hears()?;
@@ -64,15 +64,15 @@ impl Peer<TcpStream> {
     }
 }
 
-/// What a station answers to the sign of life of r1, if this is one: it repeats the robot's clock.
+/// A station's answer to a sign of life of r1, if `line` is one: it repeats the robot's clock.
 pub(crate) fn answer_to_sign(line: &str) -> Option<String> {
     let clock = line.strip_prefix("lager 1 r1")?;
     Some(format!("lager 1 tester{clock}"))
 }
 
-/// An external computer that the test plays, for a robot that is up and stands in manual mode.
+/// A robot that stands in manual mode, and the external computer that the test plays for it.
 pub(crate) struct Scene {
-    /// `None` where another process plays it.
+    /// `None` if another process plays the external computer.
     listener: Option<TcpListener>,
     truth: Subscriber<TruthPose>,
     pub(crate) up: Running,
@@ -85,7 +85,7 @@ impl Scene {
         Self::with(TcpListener::bind("127.0.0.1:0").expect("a port"))
     }
 
-    /// One whose robot connects to this listener.
+    /// A scene whose robot connects to this listener.
     pub(crate) fn with(listener: TcpListener) -> Self {
         let address = listener.local_addr().expect("an address").to_string();
         Self {
@@ -94,9 +94,9 @@ impl Scene {
         }
     }
 
-    /// One whose external computer is played by another process at `address`.
+    /// A scene whose external computer is another process, at `address`.
     pub(crate) fn at(domain: Domain, address: &str) -> Self {
-        // Real boards, as far as `up` knows: it starts in manual mode and no script drives.
+        // `up` takes these for real boards, so it starts in manual mode and no script drives.
         let [sensor, steering] =
             ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
         let config = domain.folder().join("lager.toml");
@@ -124,7 +124,7 @@ impl Scene {
         }
     }
 
-    /// Where the robot connects, for a station that listens there itself.
+    /// The listener to which the robot connects, for a station in this process.
     pub(crate) fn listener(&self) -> TcpListener {
         let listener = self.listener.as_ref().expect("it is played here");
         listener.try_clone().expect("a socket")
@@ -138,7 +138,7 @@ impl Scene {
         Peer(BufReader::new(stream))
     }
 
-    /// Where the middle of the axle is, in mm.
+    /// The place of the middle of the axle, in mm.
     pub(crate) fn place(&mut self) -> (f64, f64) {
         wait_for("the truth", || {
             let truth = self.truth.latest().expect("readable")?;
@@ -146,13 +146,13 @@ impl Scene {
         })
     }
 
-    /// The duties at the motors, as the world has them now.
+    /// The newest duties of the motors in the simulated world.
     pub(crate) fn duties(&mut self) -> Option<(u8, u8)> {
         let truth = self.truth.latest().expect("readable")?;
         Some((truth.left_duty, truth.right_duty))
     }
 
-    /// Looks for so long whether it moves, which it must not.
+    /// Asserts that the robot does not move for this time.
     pub(crate) fn assert_it_stays(&mut self, time: Duration) {
         let start = Instant::now();
         while start.elapsed() < time {
@@ -170,8 +170,8 @@ impl Scene {
         });
     }
 
-    /// Drives the robot forward until its wheels turn. A machine that was held up for as long as a
-    /// lease ends the command, so it is given as often as it is asked for.
+    /// Drives the robot forward until its wheels turn. If the machine is held up for as long as a
+    /// lease, the command ends, so this gives the command each time that the robot asks.
     pub(crate) fn drive(&mut self, is_extended: bool) -> Peer<TcpStream> {
         'connected: loop {
             let mut robot = self.robot();
@@ -191,7 +191,7 @@ impl Scene {
                     return robot;
                 }
                 if !is_extended && line == "styrcomm" {
-                    // It says nothing more before the next command.
+                    // The robot sends nothing more before the next command.
                     while !self.moves_within(Duration::from_millis(500)) {
                         robot.says("styrcomm 2");
                     }

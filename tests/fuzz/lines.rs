@@ -1,10 +1,10 @@
-//! Any bytes as lines of the text languages, held to the laws that the ordinary tests ask for:
+//! A fuzz target: any bytes as lines of the text languages, under the ordinary tests' laws.
 //!
 //! ```text
 //! cargo +nightly fuzz run --fuzz-dir tests/fuzz lines /tmp/found bus/lines/tests/corpus
 //! ```
 //!
-//! What it finds goes to the first folder; what is worth keeping, to the second one.
+//! New findings go to the first folder. Copy those worth keeping to the second one.
 //!
 //! It is a workspace of its own, because only a nightly compiler builds it. The corpus and the laws
 //! belong to the ordinary tests of `lager-lines`, which mutate the corpus deterministically: ten

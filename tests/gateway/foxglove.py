@@ -1,5 +1,5 @@
-"""Looks at a robot live, with a client by others: URL, then topics. Prints what the server says of
-itself, each channel's schema, and the last message of each topic; the schemas have accepted all."""
+"""Looks at a robot live with a foreign client; arguments: URL, then topics. Prints the server's
+data about itself, each channel's schema, and each topic's last message. Checks all schemas."""
 
 import asyncio
 import contextlib
@@ -17,14 +17,14 @@ async def look():
     client = WebSocketBridgeClient(url, min_retry_delay=0.1)
     last, refused, whole = {}, [], asyncio.Event()
 
-    # Made once for each schema: who is slower than the robot finds his pings unanswered.
+    # Cached: a client that is slower than the robot would not answer its pings in time.
     @functools.cache
     def validator(schema):
         schema = json.loads(schema)
         return jsonschema.validators.validator_for(schema)(schema)
 
     def message(channel, unix_ns, data):
-        # What a handler raises, the client only logs.
+        # The client would only log an exception of this handler.
         try:
             value = json.loads(data)
             validator(channel["schema"]).validate(value)
@@ -41,7 +41,7 @@ async def look():
     while not wanted <= {channel["topic"] for channel in client.channels.values()}:
         await asyncio.sleep(0.05)
     while not whole.is_set():
-        # This client may overlook what comes at once, so it subscribes anew to what has not come.
+        # The client may miss a message that comes at once: subscribe again to topics without one.
         for topic in wanted - last.keys():
             await client.unsubscribe(topic)
             await client.subscribe(topic)

@@ -1,5 +1,5 @@
-//! `--foxglove`: what a viewer is shown of a robot that is up. They need a program with the feature
-//! `foxglove`, which `tests/run` builds.
+//! Tests of `--foxglove`: what a viewer sees of a running robot. They need a program with the
+//! feature `foxglove`, which `tests/run` builds.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -9,14 +9,15 @@ use std::time::Duration;
 
 use lager_journal::View;
 use lager_ports::{Bus, Cause, Publisher};
+use lager_sample::{Qos, Topic, payload};
 use lager_tests::{Domain, free, wait_for};
-use lager_topics::{Qos, Role, TOPICS, Topic, payload};
+use lager_topics::{Role, TOPICS};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::{Error, Message, WebSocket};
 
 payload! {
-    /// Much, so that little of it fills a connection.
+    /// A large payload, so that few samples fill a connection.
     pub struct Much: 1032 bytes {
         /// Counts from 0.
         pub number: u64,
@@ -25,7 +26,7 @@ payload! {
     }
 }
 
-/// A topic that is in no table.
+/// A topic that the robot's table does not have.
 #[derive(Clone, Copy, Debug)]
 struct MuchNow;
 
@@ -36,15 +37,15 @@ impl Topic for MuchNow {
     const SUMMARY: &'static str = "Much.";
 }
 
-/// Somebody who looks at everything.
+/// A viewer that subscribes to everything.
 struct Viewer {
     socket: WebSocket<TcpStream>,
-    /// The channels' topics, by their numbers.
+    /// The topic of each channel number.
     topics: BTreeMap<u64, String>,
 }
 
 impl Viewer {
-    /// Subscribes to everything as soon as there is `topic`; `None` while nobody listens.
+    /// Subscribes to everything when the gateway has `topic`; `None` while nobody listens.
     fn connect(address: &str, topic: &str) -> Option<Self> {
         let stream = TcpStream::connect(address).ok()?;
         let mut request = format!("ws://{address}")
@@ -65,7 +66,7 @@ impl Viewer {
         let all = topics.keys();
         let all: Vec<Value> = all.map(|id| json!({"id": id, "channelId": id})).collect();
         let wish = json!({"op": "subscribe", "subscriptions": all}).to_string();
-        // Asked twice, it says that it has understood.
+        // When the second request is answered, the gateway has handled the first one.
         for _ in 0..2 {
             socket.send(wish.clone().into()).expect("it is heard");
         }
@@ -78,8 +79,8 @@ impl Viewer {
         Some(Self { socket, topics })
     }
 
-    /// The number in the next message of [`MuchNow`], and how long that message is; `None` if none
-    /// has come.
+    /// The number in the next message of [`MuchNow`], and the message's length in bytes; `None` if
+    /// none has come.
     fn number(&mut self) -> Option<(u64, usize)> {
         loop {
             let bytes = match self.socket.read() {
@@ -99,7 +100,7 @@ impl Viewer {
     }
 }
 
-/// The next thing that the server says of itself.
+/// The server's next message about itself.
 fn said(socket: &mut WebSocket<TcpStream>) -> Value {
     loop {
         if let Message::Text(text) = socket.read().expect("it goes on") {
@@ -114,10 +115,11 @@ fn send(publisher: &Publisher<MuchNow>, number: u64) {
     publisher.send(Cause::OWN, much).expect("a sample");
 }
 
-/// More than waits for who reads nothing: in his queue, and on both sides of his connection.
+/// More bytes than wait for a viewer that reads nothing, in its queue and in its connection.
 const MUCH: usize = 8 << 20;
 
 #[test]
+#[cfg_attr(not(feature = "foxglove"), ignore = "needs --features lager/foxglove")]
 fn who_reads_nothing_loses_messages_and_holds_nobody_up() {
     let domain = Domain::new();
     let address = free();
@@ -128,7 +130,7 @@ fn who_reads_nothing_loses_messages_and_holds_nobody_up() {
     let mut asleep = wait_for("the gateway", connect);
     let mut awake = wait_for("the gateway", connect);
 
-    // A reader meets a writer when it looks.
+    // A subscriber finds its publisher only when it looks.
     let mut sent = 0;
     let mut heard = wait_for("the first message", || {
         send(&publisher, sent);
@@ -152,7 +154,7 @@ fn who_reads_nothing_loses_messages_and_holds_nobody_up() {
         }
     }
 
-    // The other one wakes up, and goes on with what is new.
+    // The viewer that slept reads again, and continues with new samples.
     let (mut before, _) = wait_for("an old message", || asleep.number());
     let mut missed = 0;
     while before < sent - 1 {
@@ -161,7 +163,7 @@ fn who_reads_nothing_loses_messages_and_holds_nobody_up() {
         before = number;
     }
     assert!(missed > 0, "all {read} bytes waited for him");
-    // Viewers come and go without a word to who looks after the robot.
+    // Viewers that come and go are not logged at the robot.
     drop((asleep, awake));
     assert!(connect().is_some());
     assert_eq!(gateway.log(), "");
@@ -175,14 +177,14 @@ fn a_client_by_others_gets_channels_schemas_and_messages() {
     let domain = Domain::new();
     let address = free();
     let up = domain.start(&["up", "--headless", "--foxglove", &address, "--mission", "1"]);
-    // It comes late: the map and all that stands in it were shown before.
+    // The gateway starts late: the map and everything in it were published before.
     domain.done(&["topic", "echo", "nav/map", "--count", "1", "--wait"]);
     let views = View::ALL.map(View::topic);
-    // Nothing is in the robot's way.
+    // Nothing is in the robot's way, so there are no blocks.
     let views = views.iter().filter(|view| **view != View::Blocks.topic());
     let topics = ["sensor/line", "steering/state", "nav/map", "nav/status"];
     let output = Command::new(std::env::var_os("LAGER_PYTHON").expect("it names a Python"))
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/gateway/foxglove.py"))
+        .arg(lager_tests::in_tree("tests/gateway/foxglove.py"))
         .arg(format!("ws://{address}"))
         .args(views.chain(&topics))
         .output()

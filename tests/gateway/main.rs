@@ -1,4 +1,4 @@
-//! `lager gateway`: what a robot that is up shows to programs outside.
+//! Tests of `lager gateway`: what it shows of a running robot to programs outside the bus.
 
 mod live;
 
@@ -11,7 +11,7 @@ use std::time::Duration;
 use lager_tests::{Domain, free, pid, wait_for};
 use rustix::process::{Signal, kill_process};
 
-/// What is answered to a request; `None` while nobody listens.
+/// The answer to a request; `None` while nobody listens.
 fn asked(address: &str, host: &str) -> Option<String> {
     let mut socket = TcpStream::connect(address).ok()?;
     socket.set_read_timeout(Some(Duration::from_secs(5))).ok()?;
@@ -22,7 +22,7 @@ fn asked(address: &str, host: &str) -> Option<String> {
     Some(answer)
 }
 
-/// The text of the figures.
+/// The text with all metrics.
 fn text(address: &str) -> Option<String> {
     let answer = asked(address, address)?;
     let (head, text) = answer.split_once("\r\n\r\n")?;
@@ -41,7 +41,7 @@ fn figures(address: &str) -> Option<BTreeMap<String, f64>> {
     Some(each.collect())
 }
 
-/// Waits until a figure is as it should be.
+/// Waits until `is_it` is true of a figure, and returns the figure.
 fn until(address: &str, figure: &str, is_it: impl Fn(f64) -> bool) -> f64 {
     wait_for(figure, || {
         let value = *figures(address)?.get(figure)?;
@@ -80,7 +80,7 @@ fn figures_tell_what_the_robot_does_and_outlive_a_killed_gateway() {
             format!("lager_path_seconds_bucket{{robot=\"r1\",stage=\"total\",le=\"{end}\"}}");
         figures[&name]
     };
-    // Fewer are faster than 1 us than there are at all: no wake-up is.
+    // A wider bucket counts at least as many. No wake-up is as fast as 1 us.
     assert!(bucket("0.000001024") <= bucket("1.073741824"));
     assert!(bucket("1.073741824") <= bucket("+Inf"));
     assert!(figures.keys().any(|name| {
@@ -129,9 +129,9 @@ fn half_requests_keep_nobody_from_the_figures_and_use_up_no_files() {
         })
         .collect();
     until(&metrics, LINES, |samples| samples > 20.0);
-    // As many as there is room for, and the one that asks.
+    // As many connections as the gateway allows, and the one of this request.
     assert!(files() <= before + 40, "{before} and {} files", files());
-    // Each ends, and not because this end does.
+    // The gateway ends each of them.
     for mut half in crowd {
         half.set_read_timeout(Some(lager_tests::WATCHDOG))
             .expect("a socket");
@@ -160,7 +160,7 @@ fn one_that_stands_alone_says_where_it_is_and_refuses_names_and_a_taken_address(
     assert!(answer.starts_with("HTTP/1.1 421"), "{answer}");
     assert!(!answer.contains("lager_"), "{answer}");
 
-    // Before anything of a second robot runs.
+    // The second robot is refused before any process of it runs.
     let refused = domain.run(&["--name", "r2", "up", "--headless", "--metrics", &metrics]);
     let said = String::from_utf8_lossy(&refused.stderr);
     assert!(
@@ -186,7 +186,7 @@ fn the_official_parser_reads_every_figure() {
     drop(up);
     let python = std::env::var_os("LAGER_PYTHON").expect("LAGER_PYTHON names a Python");
     let mut parser = Command::new(python)
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/gateway/parse.py"))
+        .arg(lager_tests::in_tree("tests/gateway/parse.py"))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -197,7 +197,7 @@ fn the_official_parser_reads_every_figure() {
     let read = parser.wait_with_output().expect("Python ends");
     assert!(read.status.success());
     let read: serde_json::Value = serde_json::from_slice(&read.stdout).expect("JSON");
-    // Each line is a value of a family, none was passed over.
+    // Each line is a value of a family, and the parser has skipped none.
     let lines = text.lines().filter(|line| !line.starts_with('#')).count();
     assert_eq!(read["samples"], lines);
     assert_eq!(read["kinds"]["lager_path_seconds"], "histogram");

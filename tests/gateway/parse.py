@@ -1,4 +1,4 @@
-"""Reads Prometheus text with the official parser, and prints what it is."""
+"""Reads Prometheus text with the official parser, and prints the samples and kinds in it."""
 
 import json
 import sys
@@ -9,7 +9,7 @@ families = list(text_string_to_metric_families(sys.stdin.read()))
 for family in families:
     assert family.documentation, family.name
     if family.type == "histogram":
-        # Cumulative, up to the count, in each series.
+        # Each series is cumulative, and its last bucket is the count.
         series = {}
         for sample in family.samples:
             labels = tuple(sorted((k, v) for k, v in sample.labels.items() if k != "le"))

@@ -1,25 +1,25 @@
-//! What is tried: who says what and when, and what goes wrong meanwhile.
+//! A case of the search: who says what at which time, and which faults come meanwhile.
 
 use lager_wire::OperatorCommand;
 use proptest::prelude::*;
 
-/// Somebody who runs, and who may be frozen.
+/// A process that a fault may freeze.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Who {
-    /// The page of the panel in somebody's browser.
+    /// The panel's page in a person's browser.
     Page,
     /// The GaG at the station.
     Gag,
     /// The station, with the panel in it.
     Station,
     Comm,
-    /// A `lager drive` at the robot.
+    /// A `lager drive` on the robot's computer.
     Drive,
     Logic,
     Bridge,
 }
 
-/// A connection that may be slow, or cut.
+/// A connection that a fault may cut or slow down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Line {
     /// From a page to the panel.
@@ -30,18 +30,18 @@ pub(crate) enum Line {
     Serial,
 }
 
-/// What goes wrong, from `at` on, in ms.
+/// A fault that begins at `at`, in ms.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Fault {
-    /// A process stands still for so long.
+    /// A process is frozen for `lasts` ms.
     Freeze { who: Who, at: u64, lasts: u64 },
-    /// Bridge or comm is killed; its successor begins so much later.
+    /// Bridge or comm is killed; its successor starts `back` ms later.
     Kill { who: Who, at: u64, back: u64 },
-    /// The bridge is frozen, and then found silent and replaced.
+    /// The bridge is frozen; the supervisor finds it silent and replaces it after `lasts` ms.
     Replace { at: u64, lasts: u64 },
-    /// Nothing passes for so long.
+    /// Nothing passes for `lasts` ms.
     Cut { line: Line, at: u64, lasts: u64 },
-    /// Whatever is sent in this time takes so much longer.
+    /// Whatever is sent in this time arrives later by this delay.
     Slow {
         line: Line,
         at: u64,
@@ -50,64 +50,64 @@ pub(crate) enum Fault {
     },
 }
 
-/// What somebody does.
+/// An action of a person or a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Act {
-    /// A person holds a key of a page for so long, and lets go.
+    /// A person holds a key of a page for this time, and lets go.
     Hold {
         command: OperatorCommand,
         lasts: u64,
     },
-    /// A person presses a key of a page for what runs once.
+    /// A person presses a key of a page for a one-shot command.
     Press(OperatorCommand),
-    /// A person at a page wants the stop that he sees to be over.
+    /// A person at a page ends the stop that the page shows.
     Resume,
-    /// The GaG says a command, once.
+    /// The GaG gives a command once.
     Say(OperatorCommand),
-    /// Somebody at the robot runs `lager drive` for so long.
+    /// A person at the robot runs `lager drive` for this time.
     Drive {
         command: OperatorCommand,
         lasts: u64,
     },
-    /// Somebody at the robot stops it.
+    /// A person at the robot stops it.
     Stop,
-    /// Somebody at the robot ends the stop that he sees.
+    /// A person at the robot ends the stop in force.
     ResumeHere,
 }
 
-/// Who drives.
+/// Who drives the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Way {
     /// People.
     ByHand,
-    /// Logic, from the start on.
+    /// Logic, from the start.
     ByItself,
-    /// Logic, which stands at goods and lets the external computer move the arm.
+    /// Logic, which stands at goods while the external computer moves the arm.
     Picking,
 }
 
-/// One run.
+/// One run of the model.
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
     pub(crate) way: Way,
-    /// What is done, and when, in ms.
+    /// The actions, each with its time in ms.
     pub(crate) acts: Vec<(u64, Act)>,
     pub(crate) faults: Vec<Fault>,
 }
 
-/// How long a case lasts, in ms from the moment at which the robot can be driven.
+/// The length of a case, in ms from the moment at which the robot can be driven.
 pub(crate) const LENGTH: u64 = 6_000;
 
-/// Turns the wheels until it is told otherwise.
+/// Turns the wheels until another command comes.
 pub(crate) const LEFT: OperatorCommand = OperatorCommand::Left;
 /// Turns by 45 degrees, and ends by itself.
 pub(crate) const TURN: OperatorCommand = OperatorCommand::LeftDiag;
-/// The arm's step that takes long: it closes the claw.
+/// A long step of the arm: it closes the claw.
 pub(crate) fn squeeze() -> OperatorCommand {
     OperatorCommand::arm("squeeze").expect("a step of the arm")
 }
 
-/// What somebody may do by this way of driving.
+/// The actions that are possible in this way of driving.
 fn acts(way: Way) -> BoxedStrategy<Act> {
     let lasts = || 300..2_500_u64;
     let stops = prop_oneof![Just(Act::Stop), Just(Act::ResumeHere), Just(Act::Resume)];
@@ -130,7 +130,7 @@ fn acts(way: Way) -> BoxedStrategy<Act> {
     }
 }
 
-/// What may go wrong around one of the moments at which something is done.
+/// The faults that may come around the time of one of the actions.
 fn faults(acts: &[(u64, Act)]) -> BoxedStrategy<Fault> {
     let moments: Vec<u64> = acts.iter().map(|(at, _)| *at).collect();
     let at = move || {
@@ -160,7 +160,7 @@ fn faults(acts: &[(u64, Act)]) -> BoxedStrategy<Fault> {
     .boxed()
 }
 
-/// Everything that may come together.
+/// All cases that the search may try.
 pub(crate) fn cases() -> impl Strategy<Value = Case> {
     let way = prop_oneof![
         3 => Just(Way::ByHand),

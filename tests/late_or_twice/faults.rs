@@ -1,14 +1,14 @@
-//! What is wrong at a moment.
+//! The faults of a case as seen at one moment: which process runs, and which connection works.
 
 use crate::case::{Fault, Line, Who};
 
-/// When the robot can be driven, in ms: its boards are up by then, and somebody has its wheel. Acts
-/// and faults count from then on.
+/// The time when the robot can be driven, in ms: its boards are up, and a page has its wheel. The
+/// times of actions and faults count from then on.
 pub(crate) const READY: u64 = 1_500;
-/// How long a killed bridge's successor takes at the least, in ms.
+/// The shortest time until a killed bridge has a successor, in ms.
 const REPLACED: u64 = 60;
 
-/// A moment in ms, and everything that goes wrong in a run.
+/// A moment in ms, and all faults of a run.
 #[derive(Clone, Copy)]
 pub(crate) struct Faults<'a>(pub(crate) u64, pub(crate) &'a [Fault]);
 
@@ -30,7 +30,7 @@ impl Faults<'_> {
     pub(crate) fn is_killed(self, process: Who) -> bool {
         self.1.iter().any(|fault| match *fault {
             Fault::Kill { who, at, back } => who == process && self.is_in(at, back),
-            // Who was found silent is killed, and its successor takes a moment.
+            // The supervisor kills a silent bridge, and the successor needs a moment.
             Fault::Replace { at, lasts } => {
                 process == Who::Bridge && self.is_in(at + lasts, REPLACED)
             }
@@ -38,14 +38,14 @@ impl Faults<'_> {
         })
     }
 
-    /// Whether nothing passes.
+    /// Whether the connection is cut now.
     pub(crate) fn is_cut(self, wire: Line) -> bool {
         self.1.iter().any(|fault| {
             matches!(*fault, Fault::Cut { line, at, lasts } if line == wire && self.is_in(at, lasts))
         })
     }
 
-    /// How much longer what is sent now takes, in ms.
+    /// The extra delay of what is sent now, in ms.
     pub(crate) fn slow(self, wire: Line) -> u64 {
         let slow = self.1.iter().map(|fault| match *fault {
             Fault::Slow {

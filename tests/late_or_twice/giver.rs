@@ -1,29 +1,28 @@
-//! Who gives commands: a page of the panel, a GaG, `lager drive`, and logic.
+//! The four that give commands: a page of the panel, a GaG, `lager drive`, and logic.
 
-use lager_lines::command::Wheels;
-use lager_lines::extension::{Action, LeaseMs};
-use lager_topics::{Finish, Mode, Origin, SteeringOrder};
+use lager_orders::{Action, LeaseMs, Mode, Wheels};
+use lager_topics::{Finish, Origin, SteeringOrder};
 use lager_wire::{Command, OperatorCommand};
 
 use crate::case::Way;
 use crate::judge::Judge;
 use crate::robot::Bus;
 
-/// How often a page repeats what a held key means, in ms.
+/// How often a page repeats the command of a held key, in ms.
 const REPEAT: u64 = 50;
-/// How often a page says that it is there, in ms.
+/// How often a page gives a sign of life, in ms.
 const HERE: u64 = 1_000;
-/// How often an order is renewed, in ms, and its lease.
+/// How often an order is renewed, in ms; the next constant is its lease.
 const RENEWAL: u64 = 40;
 const LEASE: u64 = 120;
-/// Who renews lets go when the board has not reported for so long, in ms.
+/// `lager drive` ends its order when the board has not reported for this time, in ms.
 const UNHEARD: u64 = 200;
 
-/// What a page says to the panel, with the time of its own clock.
+/// A message of a page to the panel, with the time of the page's own clock.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Said {
     pub(crate) said_ms: u32,
-    /// `None`: that it is there.
+    /// `None` = a sign of life.
     pub(crate) action: Option<Action>,
 }
 
@@ -45,7 +44,7 @@ impl Page {
         self.presses.push(action);
     }
 
-    /// What it says now.
+    /// The page's messages at this moment.
     pub(crate) fn turn(&mut self, now: u64, judge: &mut Judge) -> Vec<Said> {
         let mut actions: Vec<_> = self.presses.drain(..).map(Some).collect();
         if let Some((command, until)) = self.held
@@ -68,14 +67,14 @@ impl Page {
             self.here = now + HERE;
             actions.push(None);
         }
-        // Its clock is another than the robot's.
+        // The page's clock differs from the robot's.
         let said_ms = now as u32 + 70_000;
         let said = actions.into_iter();
         said.map(|action| Said { said_ms, action }).collect()
     }
 }
 
-/// An action of the extension for a command to the wheels.
+/// The extension's action for a command to the wheels.
 pub(crate) fn drive(command: OperatorCommand) -> Option<Action> {
     Some(Action::Drive {
         wheels: Wheels::new(command)?,
@@ -117,7 +116,7 @@ impl Drive {
         }
     }
 
-    /// Renews the order; whether it goes on.
+    /// Renews the order if it is time; false when the process ends its order.
     pub(crate) fn turn(&mut self, now: u64, bus: &mut Bus, judge: &mut Judge) -> bool {
         if now < self.renewed + RENEWAL {
             return true;
@@ -152,8 +151,8 @@ impl Drive {
     }
 }
 
-/// Logic, as far as it gives orders: while it may it drives, it hears how its order ends and gives
-/// another one, and it stands while the board does not report.
+/// Logic, as far as it gives orders: it drives while it may, gives another order when it hears that
+/// one has ended, and stands while the board does not report.
 #[derive(Debug)]
 pub(crate) struct Logic {
     command: Command,

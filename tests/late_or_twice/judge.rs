@@ -1,31 +1,31 @@
-//! The two laws, and who breaks them.
+//! The two laws, and a judge that names each break of a law.
 //!
-//! 1. **Nothing moves late.** Whatever sets the robot in motion comes at most 200 ms after its giver
-//!    has said it, each saying moves it once, and what is to be renewed ends soon after its giver is
-//!    gone.
-//! 2. **Nothing moves after a newer stop**, until somebody who has seen that stop ends it.
+//! 1. **Nothing moves late.** The robot moves at most 200 ms after a giver (a person or a program)
+//!    has sent a command. Each command moves it once, and a command that needs renewal ends soon
+//!    after its giver is gone.
+//! 2. **Nothing moves after a newer stop** until a person who has seen that stop ends it.
 //!
 //! The judge sees what the people do and what the motors and the arm do, and nothing between.
 
 use lager_wire::Command;
 
-/// How old a saying may be, in ms.
+/// How old a command may be when the robot begins to move, in ms.
 const LATEST: u64 = 200;
-/// What the way takes where nothing holds anything up: a turn of each process and a packet, in ms.
+/// The time from giver to board without any delay: a turn of each process and a packet, in ms.
 const WAY: u64 = 40;
-/// How long the robot has stood when motion counts as begun anew, in ms: a board whose commands fail
-/// to come stands after 150 ms.
+/// After this time of standing, a motion counts as a new one, in ms. A board that gets no commands
+/// stands after 150 ms.
 const REST: u64 = 200;
-/// How long motion may go on after its giver is gone, in ms, if every hop is held up as long as it
-/// may be: 200 on the way, the page's 150, the bridge's lease of 120, the board's 150.
+/// The longest time that motion may go on after its giver is gone, in ms, with the longest allowed
+/// delay in each hop: 200 on the way, the page's 150, the bridge's lease of 120, the board's 150.
 const GONE: u64 = 200 + 150 + 120 + 150;
-/// After a stop the bridge's standby comes at once, and where the bridge stands still the board ends
-/// by itself, in ms.
+/// The longest time from a stop until the robot stands, in ms. The bridge sends standby at once; if
+/// the bridge is frozen, the board ends its command by itself.
 const STOPS: u64 = 200;
 /// The longest turn, in ms.
 const TURN: u64 = 4_000;
 
-/// A command that somebody has given.
+/// A given command.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     at: u64,
@@ -36,24 +36,24 @@ struct Given {
 #[derive(Debug, Default)]
 pub(crate) struct Judge {
     given: Vec<Given>,
-    /// When a giver of a setpoint was there last.
+    /// When the giver of a setpoint was last there.
     there: Option<u64>,
     /// The stop in force and when it was set.
     stop: Option<(u64, u64)>,
     moved: Option<u64>,
-    /// What the board was told last.
+    /// Code and number of the board's last command.
     told: Option<(u8, u8)>,
-    /// How much was moved, in ms, and how many one-shots began.
+    /// The time of all motion, in ms, and the number of one-shots that began.
     pub(crate) motion: u64,
     pub(crate) one_shots: u32,
-    /// When the last of them began, and how long the longest was in force, in ms.
+    /// When the last one-shot began, and how long the longest was in force, in ms.
     began: Option<u64>,
     pub(crate) longest: u64,
     pub(crate) faults: Vec<String>,
 }
 
 impl Judge {
-    /// Somebody gives a command to move.
+    /// A giver gives a command to move.
     pub(crate) fn gives(&mut self, at: u64, command: Command) {
         let is_one_shot = command.is_one_shot();
         self.given.push(Given {
@@ -64,7 +64,7 @@ impl Judge {
         self.is_there(at);
     }
 
-    /// Who gave the setpoint in force is there.
+    /// The giver of the setpoint in force is still there.
     pub(crate) fn is_there(&mut self, at: u64) {
         self.there = Some(at);
     }
@@ -73,12 +73,12 @@ impl Judge {
         self.stop = Some((at, word));
     }
 
-    /// Somebody says that the stop with this word is to end.
+    /// A person asks to end the stop with this word.
     pub(crate) fn resumes(&mut self, word: u64) {
         self.stop = self.stop.filter(|(_, stop)| *stop != word);
     }
 
-    /// The board is told a command.
+    /// The board gets a command.
     pub(crate) fn told(&mut self, now: u64, code: u8, seq: u8) {
         let before = self.told.replace((code, seq));
         let Some(command) = Command::from_code(code).filter(|_| before != Some((code, seq))) else {
@@ -103,7 +103,7 @@ impl Judge {
         }
     }
 
-    /// What the motors do at this moment.
+    /// The duties of the motors at this moment.
     pub(crate) fn sees(&mut self, now: u64, duties: [i16; 2]) {
         if duties == [0, 0] {
             return;

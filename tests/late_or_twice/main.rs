@@ -1,5 +1,5 @@
-//! Nothing may move late, or twice: every machine between a person and the motors, joined in virtual
-//! time, with a fault at every hop.
+//! Tests that no order moves the robot late, or twice: every machine between a person and the
+//! motors, joined in virtual time, with a fault at every hop.
 //!
 //! ```text
 //!  page -> panel -> station -> link -> comm --.
@@ -7,15 +7,13 @@
 //!  lager drive, logic ------------------------'
 //! ```
 //!
-//! The laws are in `judge.rs`. They are held over freezes, kills, cuts and delays (`case.rs`), and
-//! each mend is shown to be needed: without it the same search finds who breaks a law.
+//! The laws are in `judge.rs`. The tests search for a break of a law under freezes, kills, cuts and
+//! delays (`case.rs`). Without one of the protections (`mends.rs`), the same search finds a break.
 
 mod case;
 mod faults;
 mod giver;
 mod judge;
-#[path = "../../services/panel/src/late.rs"]
-mod late;
 mod mends;
 mod robot;
 mod wire;
@@ -44,10 +42,10 @@ const DRIVEN: Act = Act::Drive {
     lasts: 4_500,
 };
 
-/// What happened to people, how, and what takes its mend out.
+/// A defect that people met: its name, its case, and a function that takes its mend out.
 type Found = (&'static str, Case, fn(&mut Mends));
 
-/// What happened to people, each with the mends that keep it from happening again.
+/// The defects that people met, each with the mends that now prevent it.
 fn found() -> Vec<Found> {
     let by_hand = |acts: &[(u64, Act)], faults: &[Fault]| case(Way::ByHand, acts, faults);
     let frozen = |who, at, lasts| Fault::Freeze { who, at, lasts };
@@ -61,7 +59,7 @@ fn found() -> Vec<Found> {
         (
             "an old resume over a frozen comm",
             case(Way::ByItself, &stopped, &[frozen(Who::Comm, 800, 1_500)]),
-            // It is too old as well.
+            // The resume is also too old.
             |mends| (mends.named, mends.aged) = (false, false),
         ),
         (
@@ -97,7 +95,7 @@ fn found() -> Vec<Found> {
                 &[(1_000, Act::Press(TURN))],
                 &[frozen(Who::Bridge, 950, 1_000)],
             ),
-            // Comm lets go of it as well.
+            // Comm also ends the order by itself.
             |mends| (mends.aged, mends.heirs) = (false, false),
         ),
         (
@@ -179,7 +177,7 @@ fn without_its_mend_each_of_them_happens() {
     );
 }
 
-/// A model in which nothing ever moves would keep both laws.
+/// This shows that the model moves: one in which nothing moves would keep both laws, too.
 #[test]
 fn where_nothing_is_wrong_everybody_moves_the_robot() {
     let [held, said, driven] = [HELD, Act::Say(LEFT), DRIVEN].map(|act| {
@@ -199,8 +197,8 @@ fn where_nothing_is_wrong_everybody_moves_the_robot() {
     }
 }
 
-/// Sign and silence follow from what runs: a step of the arm that takes long hangs no link up,
-/// whoever drives.
+/// The running command decides about signs of life and silence, so a long step of the arm does not
+/// make comm close the link, whoever drives.
 #[test]
 fn a_step_of_the_arm_that_takes_long_comes_to_its_end() {
     let comes_to_its_end = |way, mends| {
@@ -221,9 +219,9 @@ fn a_step_of_the_arm_that_takes_long_comes_to_its_end() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        // Each joins seven seconds of everything.
+        // Each case runs the whole model for seven seconds.
         cases: ProptestConfig::default().cases / 2,
-        // A case that is found becomes one of `found`.
+        // Add a case that the search finds to `found`.
         failure_persistence: None,
         ..ProptestConfig::default()
     })]

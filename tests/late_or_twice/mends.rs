@@ -1,20 +1,20 @@
-//! What keeps the laws, and what the robot would do without it. Each mend can be taken out where it
-//! meets the next machine: then that machine is told what it would have been told before.
+//! The protections ("mends") that keep the laws. A test can take each of them out: then the next
+//! machine gets what it would have got before the mend.
 
 use std::time::Duration;
 
-/// Which of them are in.
+/// Which mends are in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Mends {
     /// A resume names the stop that it ends.
     pub(crate) named: bool,
-    /// An order carries its age over each hop, and a hop notices its own pause.
+    /// An order carries its age over each hop, and a hop notices when it was itself held up.
     pub(crate) aged: bool,
-    /// A successor takes up no order that is older than its lease, and who renews lets go.
+    /// A successor takes over no order older than its lease, and a giver stops renewing in time.
     pub(crate) heirs: bool,
-    /// Sign and silence follow from what runs, not from the mode.
+    /// The running command decides about signs of life and silence, and not the mode.
     pub(crate) signs: bool,
-    /// The station sees that a GaG does not read.
+    /// The station notices a GaG that does not read.
     pub(crate) seen: bool,
 }
 
@@ -27,7 +27,7 @@ impl Mends {
         seen: true,
     };
 
-    /// How old an order is, as the bridge is told it.
+    /// The age of an order as the bridge gets it.
     pub(crate) fn age(self, age: Duration) -> Duration {
         match self.aged {
             true => age,
@@ -35,8 +35,8 @@ impl Mends {
         }
     }
 
-    /// When the state of an earlier bridge was published, as its successor is told it, in ms: one
-    /// that takes up everything waits until its board is there.
+    /// The time when an earlier bridge published its state, as its successor gets it, in ms.
+    /// Without the mend the successor takes over everything, and waits until its board is there.
     pub(crate) fn published(self, now: u64, at: u64) -> u64 {
         match self.heirs {
             true => at,
@@ -44,7 +44,7 @@ impl Mends {
         }
     }
 
-    /// What comm is told by the station: a resume that names no stop means the one that comm knows.
+    /// A line as comm gets it. Without the mend, a resume means the stop that comm knows.
     pub(crate) fn to_comm(self, line: &str, stop_word: u64) -> String {
         match line.split_once(" resume ") {
             Some((number, _)) if !self.named => format!("{number} resume {stop_word}"),
@@ -52,7 +52,7 @@ impl Mends {
         }
     }
 
-    /// What the station is told by comm: a sign without the robot's clock tells no age.
+    /// A line as the station gets it. Without the mend, a sign lacks the robot's clock.
     pub(crate) fn to_station(self, line: &str) -> String {
         match line.starts_with("lager ") && !self.aged {
             true => line.split(' ').take(3).collect::<Vec<_>>().join(" "),

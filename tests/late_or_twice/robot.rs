@@ -1,23 +1,26 @@
-//! Bridge, boards and body: the real ones, joined as the processes are. The robot's other processes
-//! see it by what is on the bus.
+//! The real bridge, boards and body, joined as the processes are. The robot's other processes see
+//! them by the samples on the bus.
 
 use std::time::Duration;
 
+use lager_bridge::Counts;
 use lager_bridge::listener::{Heard, Listener};
-use lager_bridge::machine::{Action, BridgeCore, CoreOptions};
-use lager_bridge::{Counts, Moment};
+use lager_bridge::machine::{BridgeCore, CoreOptions, Effect};
+use lager_orders::Moment;
 use lager_plant::{Make, Warehouse};
-use lager_ports::Stop;
 use lager_simulator::{Robot as Body, RobotOptions, Wire};
-use lager_topics::{Answer, Ask, Health, Origin, Role, SteeringOrder, SteeringReport, StopCause};
+use lager_stop::Stop;
+use lager_topics::{
+    Ask, BridgeAnswer, Health, Origin, Role, SteeringOrder, SteeringReport, StopCause,
+};
 use lager_wire::ArmProfile;
 
 use crate::judge::Judge;
 use crate::mends::Mends;
 
-/// The steering board's port.
+/// The index of the steering board's port.
 const PLACE: usize = 1;
-/// Orders that wait to be read, at most; the oldest are lost.
+/// The most orders that wait to be read; older ones are lost.
 const QUEUE: usize = 64;
 
 pub(crate) fn moment(now: u64) -> Moment {
@@ -27,21 +30,21 @@ pub(crate) fn moment(now: u64) -> Moment {
     }
 }
 
-/// What is on the bus, each with when it was published, in ms.
+/// The samples on the bus, each with the time of its publication, in ms.
 #[derive(Debug, Default)]
 pub(crate) struct Bus {
     pub(crate) health: Option<(u64, Health)>,
     pub(crate) state: Option<(u64, SteeringReport)>,
     orders: Vec<(u64, SteeringOrder)>,
     asks: Vec<Asked>,
-    pub(crate) answers: Vec<(u32, Answer)>,
-    /// The word in the robot's file.
+    pub(crate) answers: Vec<(u32, BridgeAnswer)>,
+    /// The content of the robot's stop file.
     pub(crate) stop: Option<Stop>,
 }
 
 #[derive(Debug)]
 struct Asked {
-    /// What comm knows it by; 0 is somebody at the robot.
+    /// The number by which comm knows the request; 0 = from a person at the robot.
     id: u32,
     ask: Ask,
 }
@@ -77,7 +80,7 @@ pub(crate) struct Robot {
     mends: Mends,
 }
 
-/// One life of the bridge.
+/// A bridge from its start to its end.
 #[derive(Debug)]
 struct Bridge {
     core: BridgeCore,
@@ -120,7 +123,7 @@ impl Robot {
         }
     }
 
-    /// The serial cable to the steering board is cut, or mended.
+    /// Cuts or mends the serial cable to the steering board.
     pub(crate) fn cut(&mut self, is_cut: bool) {
         if self.is_cut != is_cut {
             self.is_cut = is_cut;
@@ -128,13 +131,13 @@ impl Robot {
         }
     }
 
-    /// The bridge is killed.
+    /// Kills the bridge.
     pub(crate) fn kill(&mut self, bus: &mut Bus) {
         self.bridge = None;
         bus.orders.clear();
     }
 
-    /// Its successor takes up what it has published last.
+    /// Starts a successor, which takes over what the bridge published last.
     pub(crate) fn succeed(&mut self, now: u64, bus: &mut Bus) {
         let kept = bus.health;
         let published = self.mends.published(now, kept.map_or(0, |(at, _)| at));
@@ -156,13 +159,13 @@ impl Robot {
         self.bridge.is_some()
     }
 
-    /// Time passes for the boards.
+    /// Advances the time of the boards.
     pub(crate) fn advance(&mut self, now: u64, judge: &mut Judge) {
         self.body.advance_to(Duration::from_millis(now));
         judge.sees(now, self.body.truth().duties);
     }
 
-    /// One turn of the bridge's loop, as its service makes it.
+    /// One turn of the bridge's loop, as in its service.
     pub(crate) fn turn(&mut self, now: u64, bus: &mut Bus, judge: &mut Judge) {
         if self.bridge.is_none() {
             return;
@@ -210,7 +213,7 @@ impl Robot {
     }
 
     fn hear(&mut self, now: u64, heard: Option<Heard>, bus: &mut Bus, judge: &mut Judge) {
-        if let Some(Heard::Data(event) | Heard::Link(event)) = heard {
+        if let Some(Heard::Event(event)) = heard {
             let bridge = self.bridge.as_mut().expect("it is up");
             bridge.core.port(moment(now), PLACE, event);
             self.act(now, bus, judge);
@@ -235,37 +238,37 @@ impl Robot {
                 return;
             };
             match action {
-                Action::Write(write) => {
+                Effect::Write(write) => {
                     if let Some(command) = write.command {
                         judge.told(now, command.code, command.seq);
                     }
                     self.body.write(Wire::Steering, &write.packet);
                     core.wrote(&write, true, moment(now));
                 }
-                Action::PublishHealth { .. } => {
+                Effect::PublishHealth { .. } => {
                     let mut health = Health::default();
                     core.fill_health(moment(now).robot, counts, &mut health);
                     core.health_told();
                     bus.health = Some((now, health));
                 }
-                Action::PublishState { .. } => {
+                Effect::PublishState { .. } => {
                     let mut state = SteeringReport::default();
                     core.fill_state(moment(now).robot, &mut state);
                     core.state_told(&state);
                     bus.state = Some((now, state));
                 }
-                Action::Stop(cause) => {
+                Effect::Stop(cause) => {
                     let stop = Stop::new(Role::Bridge, cause, moment(now).ns);
                     bus.stop.get_or_insert(stop);
                 }
-                Action::Release(stop) => {
+                Effect::Release(stop) => {
                     let is_clear = bus.stop == Some(stop);
                     if is_clear {
                         (bus.stop, *heeded) = (None, None);
                     }
                     core.released(is_clear);
                 }
-                Action::Discard { .. } | Action::ShowReport(_) | Action::Say(_) => {}
+                Effect::Discard { .. } | Effect::ShowReport(_) | Effect::Say(_) => {}
             }
         }
     }

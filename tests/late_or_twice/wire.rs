@@ -1,5 +1,5 @@
-//! What carries something from one process to the next: it may hold things up, and it may be cut for
-//! a while, but it keeps their order and loses nothing, as TCP does.
+//! A connection from one process to the next. It may delay messages and may be cut for a while, but
+//! it keeps their order and loses none, as TCP does.
 
 use std::collections::VecDeque;
 
@@ -23,7 +23,7 @@ impl<T> Wire<T> {
         self.under_way.push_back((before.max(now + delay), what));
     }
 
-    /// What has arrived by `now`, unless the wire is cut.
+    /// The messages that have arrived by `now`; none while the wire is cut.
     pub(crate) fn receive(&mut self, now: u64, is_cut: bool) -> Vec<T> {
         let mut arrived = Vec::new();
         while !is_cut && self.under_way.front().is_some_and(|(at, _)| *at <= now) {
@@ -32,12 +32,12 @@ impl<T> Wire<T> {
         arrived
     }
 
-    /// Whether nothing is under way.
+    /// Whether no message is under way.
     pub(crate) fn is_empty(&self) -> bool {
         self.under_way.is_empty()
     }
 
-    /// The end that receives is closed: what is under way is lost.
+    /// The receiver closes the connection: the messages under way are lost.
     pub(crate) fn drop_all(&mut self) {
         self.under_way.clear();
     }

@@ -1,40 +1,40 @@
-//! Everything joined, in virtual time: people, station, link, comm, bus, bridge, board. Each process
-//! takes its turns as its shell does, unless it is frozen, and all of its code is the real one but
+//! The whole model in virtual time: people, station, link, comm, bus, bridge and board. Each
+//! process takes its turns as its shell does, unless it is frozen. All code is the real one, except
 //! for the shells.
 
 use std::time::Duration;
 
-use lager_comm::{Action as Does, Conversation, LinkLost};
-use lager_lines::extension::Action;
+use lager_comm::{Conversation, Effect, LinkLost};
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
-use lager_ports::Stop;
-use lager_station::{Given, Key, Output, Peer, Station, Warehouse};
-use lager_topics::{Ask, AskKind, Mode, NavigatorStatus, OrderQueue, Phase, Role, StopCause};
+use lager_orders::{Action, Code, Late, Mode};
+use lager_plant::Warehouse;
+use lager_station::{Given, Key, Output, Peer, Station};
+use lager_stop::Stop;
+use lager_topics::{Ask, AskKind, NavigatorStatus, OrderQueue, Phase, Role, StopCause};
 use lager_wire::OperatorCommand;
 
 use crate::case::{Act, Case, LENGTH, Line, Way, Who};
 use crate::faults::{Faults, READY};
 use crate::giver::{Drive, Logic, Page, Said, drive};
 use crate::judge::Judge;
-use crate::late::Late;
 use crate::mends::Mends;
 use crate::robot::{Bus, Robot, moment};
 use crate::wire::Wire;
 
-/// How often comm and station look around at least, in ms.
+/// The longest time between two turns of comm or station, in ms.
 const LOOK: u64 = 10;
 /// How long comm waits before it connects again, in ms.
 const AGAIN: u64 = 100;
-/// How often logic tells that it stands at goods, in ms.
+/// How often logic publishes that it stands at goods, in ms.
 const STATUS: u64 = 50;
-/// How long the bridge may take to answer, in ms.
+/// The longest time until the bridge answers, in ms.
 const ANSWER: u64 = 500;
 
 /// A line towards comm, or the end of the connection.
 type ToComm = Option<String>;
 
-/// What comes to the station over the link.
+/// A message to the station over the link.
 #[derive(Debug)]
 enum ToStation {
     Up(u64),
@@ -42,22 +42,22 @@ enum ToStation {
     Down(u64),
 }
 
-/// How a run went.
+/// The result of a run.
 #[derive(Debug)]
 pub(crate) struct Run {
-    /// Who broke which law.
+    /// The breaks of the laws.
     pub(crate) faults: Vec<String>,
-    /// How long something moved, in ms, and how many one-shots began.
+    /// The time of all motion, in ms, and the number of one-shots that began.
     pub(crate) motion: u64,
     pub(crate) one_shots: u32,
-    /// How long the longest of them was in force, in ms.
+    /// How long the longest one-shot was in force, in ms.
     pub(crate) longest: u64,
-    /// Links that comm gave up, and what comm said of what it could not do.
+    /// The number of links that comm closed, and comm's messages about what it could not do.
     pub(crate) hung_up: u32,
     pub(crate) thoughts: Vec<String>,
 }
 
-/// Runs a case with these mends in.
+/// Runs a case with these mends.
 pub(crate) fn run(case: &Case, mends: Mends) -> Run {
     let mut world = World::new(case, mends);
     for now in 1..READY + LENGTH {
@@ -86,7 +86,7 @@ struct World {
     late: Late,
     gag: Wire<String>,
     to_gag: Wire<String>,
-    /// The GaG has been asked for a command.
+    /// Whether the GaG was asked for a command.
     gag_is_asked: bool,
     station: Station,
     served: u64,
@@ -98,7 +98,7 @@ struct World {
     thoughts: Vec<String>,
 }
 
-/// One life of comm.
+/// A comm from its start to its end.
 struct Comm {
     conversation: Conversation,
     /// The number of the connection, if there is one.
@@ -106,12 +106,12 @@ struct Comm {
     connects: u64,
     looks: u64,
     turned: u64,
-    /// What it has seen of the bus.
+    /// The times of the newest samples that it has read.
     health: u64,
     state: u64,
     status: u64,
     asked: Vec<(u32, u64)>,
-    /// When it said its sign last.
+    /// The time of its last sign of life.
     signed: Option<u64>,
 }
 
@@ -190,7 +190,7 @@ impl World {
             for line in self.to_gag.receive(now, false) {
                 self.gag_hears(now, &line);
             }
-            // What turns the wheels by its word does so while it is there.
+            // The GaG counts as there as long as its process runs.
             if case.acts.iter().any(|(_, act)| matches!(act, Act::Say(_))) {
                 self.judge.is_there(now);
             }
@@ -222,7 +222,7 @@ impl World {
         }
     }
 
-    /// The robot is up: somebody says who drives, and a page takes the wheel.
+    /// The robot is up: sets the mode, and lets a page take the wheel.
     fn begin(&mut self, now: u64) {
         if self.way != Way::ByHand {
             let ask = Ask {
@@ -256,7 +256,7 @@ impl World {
                     self.page.press(action);
                 }
             }
-            // It answers, as the document has it: what it says unasked would wait for its turn.
+            // As in the document, the GaG only answers: an unasked command would wait for its turn.
             Act::Say(command) if faults.runs(Who::Gag) && self.gag_is_asked => {
                 self.gag_is_asked = false;
                 self.judge.gives(now, command.firmware());
@@ -282,7 +282,7 @@ impl World {
         }
     }
 
-    /// What a page says to end the stop that it shows.
+    /// A page's action to end the stop that it shows.
     fn resume(&mut self) -> Option<Action> {
         let shown = self.station.robot(&r1())?.shown();
         let stop = shown.state.as_ref()?.value.stop?;
@@ -290,14 +290,14 @@ impl World {
         Some(Action::Resume { stop })
     }
 
-    /// A turn of the station, with the panel in it.
+    /// One turn of the station and of its panel.
     fn serve(&mut self, now: u64, faults: Faults<'_>) {
         let mut waited = 0;
         match self.mends.aged {
-            // What waits may have come at any moment of a pause.
+            // A waiting message may have come at any moment of the pause.
             true if now - self.served > 200 => waited = now - self.served,
             true => {}
-            // A pause counted for nothing.
+            // Without the mend, the station did not notice its own pause.
             false => (self.served + 1..now).for_each(|at| self.station.turn(moment(at).robot)),
         }
         self.served = now;
@@ -350,7 +350,7 @@ impl World {
         }
     }
 
-    /// What a page says, as the panel hands it on.
+    /// A page's action, as the panel gives it to the station.
     fn panel(&mut self, late: Duration, action: Action) {
         let late = self.mends.age(late);
         let Some(key) = self.key else { return };
@@ -363,7 +363,7 @@ impl World {
         };
     }
 
-    /// A GaG describes the floor when it is asked; what it commands it says by itself.
+    /// The GaG describes the floor when it is asked; its commands are actions of the case.
     fn gag_hears(&mut self, now: u64, line: &str) {
         let answer = match line.trim_end() {
             "sidelength" => "sidelength 50",
@@ -375,7 +375,7 @@ impl World {
         self.gag.send(now, 1, answer.to_owned());
     }
 
-    /// A turn of comm, if it lives and runs.
+    /// One turn of comm, if it lives and is not frozen.
     fn talk(&mut self, now: u64, faults: Faults<'_>) {
         if faults.is_killed(Who::Comm) {
             if let Some(link) = self.comm.take().and_then(|comm| comm.link) {
@@ -399,16 +399,16 @@ impl World {
             return;
         }
         comm.looks = now + LOOK;
-        let at = comm_moment(now);
+        let at = moment(now);
         if comm.link.is_none() && now >= comm.connects && !is_cut {
             comm.link = Some(now);
             self.to_station.send(now, 1, ToStation::Up(now));
             comm.conversation.connected(at);
         }
         if !self.mends.aged || (self.way != Way::ByHand && !self.mends.signs) {
-            // A pause counted for nothing, or did where logic drives.
+            // Without the mend, comm did not notice its pause, at least where logic drives.
             for between in (comm.turned + 1..now).step_by(20) {
-                comm.conversation.turn(comm_moment(between));
+                comm.conversation.turn(moment(between));
             }
         }
         comm.turned = now;
@@ -418,7 +418,7 @@ impl World {
         let stop_word = self.bus.health.map_or(0, |(_, health)| health.stop_word);
         let comm = self.comm.as_mut().expect("it lives");
         if !self.mends.aged && !arrived.is_empty() {
-            // So did a silence of the link.
+            // Nor did it notice a silence of the link.
             comm.conversation.heard(at, &[]);
         }
         let mut lines: Vec<Result<String, LineError>> = Vec::new();
@@ -438,10 +438,10 @@ impl World {
         self.do_all(now, faults);
     }
 
-    /// What comm sees of the bus.
+    /// Lets comm read the new samples of the bus.
     fn see(&mut self, now: u64) {
         let comm = self.comm.as_mut().expect("it lives");
-        let at = comm_moment(now);
+        let at = moment(now);
         if let Some((published, health)) = self.bus.health.filter(|(at, _)| *at > comm.health) {
             comm.health = published;
             comm.conversation.health(at, &health);
@@ -455,7 +455,7 @@ impl World {
             comm.conversation.queue(at, &OrderQueue::default());
             comm.conversation.status(at, &status, at.ns);
         }
-        // Who never lets go takes the last report for a new one.
+        // Without the mend, comm takes the last report for a new one.
         let is_new = |at: u64| at > comm.state || !self.mends.heirs;
         if let Some((published, state)) = self.bus.state.filter(|(at, _)| is_new(*at)) {
             comm.state = published;
@@ -469,7 +469,7 @@ impl World {
         }
         while let Some((id, _)) = comm.asked.pop_if(|(_, at)| now >= *at + ANSWER) {
             comm.conversation
-                .answered_by_bridge(id, Err("the bridge does not answer".into()));
+                .answered_by_bridge(id, Err(Code::RobotSilent.into()));
         }
         if comm.conversation.is_to_tell(at) {
             comm.conversation.tell(at);
@@ -478,11 +478,11 @@ impl World {
 
     fn do_all(&mut self, now: u64, faults: Faults<'_>) {
         let comm = self.comm.as_mut().expect("it lives");
-        for action in comm.conversation.actions() {
-            let line = match action {
-                Does::Say(line) => to_line(&line).ok(),
-                Does::Show(report) => to_line(&report).ok(),
-                Does::HangUp(why) => {
+        for effect in comm.conversation.effects() {
+            let line = match effect {
+                Effect::Say(line) => to_line(&line).ok(),
+                Effect::Show(report) => to_line(&report).ok(),
+                Effect::HangUp(why) => {
                     self.thoughts.push(format!("at {now} ms: hung up, {why}"));
                     self.hung_up += 1;
                     if let Some(link) = comm.link.take() {
@@ -492,26 +492,26 @@ impl World {
                     comm.connects = now + AGAIN;
                     None
                 }
-                Does::Steer(order) => {
+                Effect::Steer(order) => {
                     self.bus.order(now, order);
                     None
                 }
-                Does::Ask { id, ask } => {
+                Effect::Do(lager_operator::Act::Ask { id, ask }) => {
                     comm.asked.push((id, now));
                     self.bus.ask(now, id, ask);
                     None
                 }
-                Does::Stop => {
+                Effect::Stop => {
                     let stop = Stop::new(Role::Comm, StopCause::Ordered, moment(now).ns);
                     self.bus.stop = Some(stop);
                     None
                 }
-                Does::Map(_) | Does::Order(_) | Does::Press(_) | Does::AskWorld { .. } => None,
+                Effect::Map(_) | Effect::Do(_) => None,
             };
             if let (Some(line), Some(link)) = (line, comm.link) {
                 let by_itself = self.way != Way::ByHand;
                 if line.starts_with("lager") && by_itself && !self.mends.signs {
-                    // Where logic drives it was said once a second.
+                    // Without the mend, comm gave the sign once a second while logic drove.
                     if comm.signed.is_some_and(|signed| now < signed + 1_000) {
                         continue;
                     }
@@ -529,15 +529,7 @@ impl World {
     }
 }
 
-fn comm_moment(now: u64) -> lager_comm::Moment {
-    let moment = moment(now);
-    lager_comm::Moment {
-        robot: moment.robot,
-        ns: moment.ns,
-    }
-}
-
-/// As `lager resume` asks.
+/// The request of `lager resume`.
 fn resume_here(stop: Stop) -> Ask {
     Ask {
         kind: AskKind::Resume.into(),
@@ -546,7 +538,7 @@ fn resume_here(stop: Stop) -> Ask {
     }
 }
 
-/// A command as a GaG says it.
+/// A command as a line of the GaG.
 fn written(command: OperatorCommand) -> String {
     lager_lines::gag::Answer::Command(command).to_string()
 }

@@ -1,4 +1,4 @@
-//! Chromium without a window, driven by its DevTools protocol: one browser, a page or more.
+//! A browser for the tests: Chromium without a window, which they control by the DevTools protocol.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -12,19 +12,19 @@ use lager_tests::wait_for;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-/// A browser, with a profile of its own that goes with it.
+/// A browser and its profile, which is removed when this is dropped.
 pub(crate) struct Browser {
     child: Child,
     profile: PathBuf,
-    /// Where its protocol is spoken.
+    /// The port of its DevTools protocol.
     port: u16,
 }
 
 impl Browser {
-    /// Starts one.
+    /// Starts a browser.
     ///
     /// # Panics
-    /// When there is none: `tests/run` installs it.
+    /// When Chromium is missing: `tests/run` installs it.
     pub(crate) fn new() -> Self {
         static BROWSERS: AtomicU32 = AtomicU32::new(0);
         let number = BROWSERS.fetch_add(1, Ordering::Relaxed);
@@ -38,12 +38,12 @@ impl Browser {
                 "--disable-quic",
                 "--disable-sync",
                 "--no-first-run",
-                // It is to speak to the panel alone.
+                // It must not talk to anybody but the panel.
                 "--disable-background-networking",
                 "--disable-component-update",
                 "--remote-debugging-port=0",
                 "--window-size=1280,720",
-                // Its pages speak English, whatever this machine does.
+                // Its pages are in English, whatever the language of this machine is.
                 "--accept-lang=en-US",
             ])
             .arg(format!("--user-data-dir={}", profile.display()))
@@ -52,7 +52,7 @@ impl Browser {
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
         if rustix::process::geteuid().is_root() {
-            // Its sandbox wants another user.
+            // Chromium refuses its sandbox to root.
             command.arg("--no-sandbox");
         }
         let mut child = command
@@ -67,7 +67,7 @@ impl Browser {
                 rest.split('/').next()?.parse().ok()
             })
             .expect("a browser that says where it listens");
-        // What it says further is read, so that it never waits for a reader.
+        // A thread reads the rest of its output, so that it never waits for a reader.
         std::thread::spawn(move || said.for_each(drop));
         Self {
             child,
@@ -76,7 +76,7 @@ impl Browser {
         }
     }
 
-    /// A page of its own at this address.
+    /// Opens a page with this address.
     pub(crate) fn page(&self, url: &str) -> Page {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("a browser");
         write!(
@@ -84,7 +84,7 @@ impl Browser {
             "PUT /json/new?about:blank HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
         )
         .expect("a browser that listens");
-        // It keeps the connection, whatever it is asked for.
+        // The browser keeps the connection open even if it is asked to close it.
         let mut answer = BufReader::new(stream);
         let mut length = 0;
         loop {
@@ -109,7 +109,7 @@ impl Browser {
         let (socket, _) = tungstenite::client(at, stream).expect("a page's socket");
         let mut page = Page { socket, number: 0 };
         page.call("Page.enable", &json!({}));
-        // Several people look, each at a page that is in front.
+        // Several pages may be open, and each behaves as if it were in front.
         page.call(
             "Emulation.setFocusEmulationEnabled",
             &json!({ "enabled": true }),
@@ -119,64 +119,11 @@ impl Browser {
     }
 }
 
-/// What it takes of the machine.
-impl Browser {
-    /// On all cores, since they began: the processes of its pages, and all. What a process took
-    /// that has ended meanwhile is not in it.
-    pub(crate) fn processor_times(&self) -> [Duration; 2] {
-        let second = rustix::param::clock_ticks_per_second() as f64;
-        let (mut pages, mut all) = (0.0, 0.0);
-        for (pid, stat) in self.processes() {
-            let ticks = [11, 12].map(|field| stat[field].parse::<u64>().unwrap_or(0));
-            let time = ticks.iter().sum::<u64>() as f64 / second;
-            let command = std::fs::read_to_string(format!("/proc/{pid}/cmdline"));
-            if command.is_ok_and(|command| command.contains("--type=renderer")) {
-                pages += time;
-            }
-            all += time;
-        }
-        [pages, all].map(Duration::from_secs_f64)
-    }
-
-    /// Bytes that are in memory, those that processes share counted for each.
-    pub(crate) fn memory(&self) -> u64 {
-        let pages: u64 = self
-            .processes()
-            .iter()
-            .map(|(_, stat)| stat[21].parse::<u64>().unwrap_or(0))
-            .sum();
-        pages * rustix::param::page_size() as u64
-    }
-
-    /// The number of each, and what `/proc/PID/stat` says of it behind the name.
-    fn processes(&self) -> Vec<(u32, Vec<String>)> {
-        let all: Vec<_> = std::fs::read_dir("/proc")
-            .expect("/proc")
-            .filter_map(|entry| {
-                let pid = entry.ok()?.file_name().to_str()?.parse::<u32>().ok()?;
-                let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-                let (_, rest) = stat.rsplit_once(") ")?;
-                let fields: Vec<_> = rest.split(' ').map(str::to_owned).collect();
-                Some((pid, fields))
-            })
-            .collect();
-        let mut family = vec![self.child.id()];
-        let mut next = 0;
-        while let Some(parent) = family.get(next).copied() {
-            next += 1;
-            let children = all.iter().filter(|(_, stat)| stat[1] == parent.to_string());
-            family.extend(children.map(|(pid, _)| *pid));
-        }
-        let all = all.into_iter();
-        all.filter(|(pid, _)| family.contains(pid)).collect()
-    }
-}
-
 impl Drop for Browser {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
-        // Its other processes write a moment longer.
+        // Its other processes write for a moment longer.
         for _ in 0..100 {
             let removed = std::fs::remove_dir_all(&self.profile);
             if removed.is_ok() || !self.profile.exists() {
@@ -187,19 +134,19 @@ impl Drop for Browser {
     }
 }
 
-/// A page that is open.
+/// An open page.
 pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
     number: u64,
 }
 
 impl Page {
-    /// Closes it, as a person closes a tab.
+    /// Closes the page, as a person closes a tab.
     pub(crate) fn close(mut self) {
         self.call("Page.close", &json!({}));
     }
 
-    /// Has the browser do something.
+    /// Calls a method of the DevTools protocol.
     pub(crate) fn call(&mut self, method: &str, params: &Value) -> Value {
         self.number += 1;
         let number = self.number;
@@ -219,7 +166,7 @@ impl Page {
         }
     }
 
-    /// What an expression of the page is.
+    /// The value of a JavaScript expression in the page.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let params = json!({ "expression": expression, "returnByValue": true });
         let said = self.call("Runtime.evaluate", &params);
@@ -227,7 +174,7 @@ impl Page {
         said["result"]["value"].clone()
     }
 
-    /// What the first element that fits says.
+    /// The text of the first element that matches.
     pub(crate) fn text(&mut self, selector: &str) -> String {
         let value = self.value(&format!(
             "document.querySelector({})?.textContent ?? ''",
@@ -236,7 +183,7 @@ impl Page {
         value.as_str().expect("a text").to_owned()
     }
 
-    /// Waits until an element says this.
+    /// Waits until an element's text contains `words`.
     pub(crate) fn wait_for(&mut self, selector: &str, words: &str) {
         wait_for(&format!("{selector} to say {words:?}"), || {
             self.text(selector).contains(words).then_some(())
@@ -250,7 +197,7 @@ impl Page {
         });
     }
 
-    /// The middle of the first element that fits, in pixels.
+    /// The middle of the first element that matches, in pixels.
     pub(crate) fn middle(&mut self, selector: &str) -> (f64, f64) {
         let place = self.value(&format!(
             "(() => {{ const element = document.querySelector({}); \
@@ -280,16 +227,16 @@ impl Page {
         self.click_at(at);
     }
 
-    /// Clicks at a place.
+    /// Clicks at a point in pixels.
     pub(crate) fn click_at(&mut self, at: (f64, f64)) {
         self.mouse("mouseMoved", at);
         self.mouse("mousePressed", at);
         self.mouse("mouseReleased", at);
     }
 
-    /// Clicks at a place of the warehouse, in mm from node (0, 0).
+    /// Clicks at a point of the warehouse, in mm from node (0, 0).
     pub(crate) fn click_at_mm(&mut self, right: f64, up: f64) {
-        // A view that has just opened gives the map another size some frames later.
+        // After a view has opened, the map gets its final size some frames later.
         let mut at = self.place_of_mm(right, up);
         loop {
             std::thread::sleep(Duration::from_millis(150));
@@ -301,7 +248,7 @@ impl Page {
         self.click_at(at);
     }
 
-    /// Where a spot of the floor is on the page.
+    /// The pixels of a point of the floor.
     fn place_of_mm(&mut self, right: f64, up: f64) -> (f64, f64) {
         let at = self.value(&format!(
             "(() => {{ const map = document.querySelector('#map'); \
@@ -321,7 +268,7 @@ impl Page {
         self.call("Emulation.setEmulatedMedia", &theme);
     }
 
-    /// What is seen now, as PNG.
+    /// A picture of the page, as PNG.
     pub(crate) fn picture(&mut self) -> Vec<u8> {
         let said = self.call("Page.captureScreenshot", &json!({ "format": "png" }));
         let text = said["data"].as_str().expect("a picture");
@@ -345,7 +292,7 @@ impl Page {
         self.key("keyDown", key);
     }
 
-    /// Lets go of it.
+    /// Releases a key.
     pub(crate) fn key_up(&mut self, key: &str) {
         self.key("keyUp", key);
     }
@@ -355,14 +302,14 @@ impl Page {
         self.call("Input.dispatchKeyEvent", &params);
     }
 
-    /// Presses and lets go of the Tab key, or whatever else has a place in the tab order.
+    /// Presses and releases the Tab key, which moves to the next element in the tab order.
     pub(crate) fn tab(&mut self) {
         let params = json!({ "type": "rawKeyDown", "key": "Tab", "code": "Tab", "windowsVirtualKeyCode": 9 });
         self.call("Input.dispatchKeyEvent", &params);
         self.key_up("Tab");
     }
 
-    /// Keeps what the page says to the panel, as `sent`, and its socket, as `tapped`.
+    /// From now on keeps the page's messages to the panel in `sent`, and its socket in `tapped`.
     pub(crate) fn listen_in(&mut self) {
         self.value(
             "window.sent = []; (() => { const send = WebSocket.prototype.send; \
@@ -373,7 +320,7 @@ impl Page {
         self.wait_until("window.tapped !== undefined");
     }
 
-    /// What the page has told wheels and arm since this was asked last, without numbers and times.
+    /// The page's commands to wheels and arm since the last call, without numbers and times.
     pub(crate) fn moves(&mut self) -> Vec<String> {
         let sent = self.value(
             "sent.splice(0).map((line) => line.split(' ')).filter(([verb, , , , what]) => \
@@ -384,7 +331,7 @@ impl Page {
             .collect()
     }
 
-    /// Fills in the last field that fits, as a person does who then leaves it.
+    /// Fills in the last field that matches, as a person who then leaves it.
     pub(crate) fn fill(&mut self, selector: &str, value: &str) {
         self.value(&format!(
             "(() => {{ const field = [...document.querySelectorAll({})].at(-1); field.value = {}; \
@@ -394,7 +341,7 @@ impl Page {
         ));
     }
 
-    /// For things that need a moment and show nothing.
+    /// Waits a little, for changes that cannot be seen.
     pub(crate) fn pause(&mut self) {
         std::thread::sleep(Duration::from_millis(150));
     }

@@ -1,4 +1,4 @@
-//! Driving from the page: who may, what runs once, which key is which command, and what is old.
+//! Tests of driving from the page: who may drive, what a key does, what runs once, what is too old.
 
 use lager_tests::{pid, wait_for};
 use rustix::process::{Signal, kill_process};
@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::Scene;
 use crate::browser::Page;
 
-/// Presses keys one right after the other, so that nothing can come between them.
+/// Presses keys in one step, so that nothing can come between them.
 fn press(page: &mut Page, keys: &[&str]) {
     for key in keys {
         assert!(!key.contains('\''));
@@ -26,11 +26,11 @@ pub(crate) fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand(
     page.listen_in();
     page.moves();
 
-    // An arrow while the arm makes a step is refused, in words.
+    // While the arm makes a step, an arrow key is refused with a sentence.
     press(page, &["s", "ArrowUp"]);
     page.wait_for("#drive-said", "one at a time");
     assert_eq!(page.moves(), ["arm F6"]);
-    // A person whose order was held up on the way, or before a step had ended, presses anew.
+    // If the order was held up, or a step had not ended, a person presses again.
     let until_it_moves = |scene: &mut Scene, page: &mut Page, key: &str| {
         wait_for("the robot to be driven", || {
             press(page, &[key]);
@@ -45,14 +45,14 @@ pub(crate) fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand(
         page.moves();
     };
 
-    // The command to stand comes through while a turn runs.
+    // The command to stand also works during a turn.
     until_it_moves(scene, page, "PageUp");
     page.value("document.querySelector('#pad-stand').click()");
-    assert_eq!(page.moves(), ["drive 1 1000"]);
+    assert_eq!(page.moves(), ["drive 1"]);
     scene.wait_to_stand();
     scene.assert_stands();
 
-    // What is held ends before a turn, which is then not cut by it nor by letting go of either key.
+    // A hold ends before a turn, so neither the hold nor the release of a key cuts the turn off.
     let heading = |scene: &mut Scene| {
         wait_for("the world", || {
             let truth = scene.truth.latest().expect("readable")?;
@@ -68,10 +68,10 @@ pub(crate) fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand(
              dispatchEvent(new KeyboardEvent('keyup', { key }))",
         );
         let mut said = page.moves();
-        said.retain(|line| line != "drive 4 200");
-        // Otherwise the hold had been refused before, on a machine that is held up; a turn that was
-        // held up has its reason there, too.
-        let is_held = said == ["drive 1 200", "drive 9 1000"];
+        said.retain(|line| line != "drive 4");
+        // If not, the robot had refused the hold before, on a machine that is held up. A turn that
+        // was held up shows its reason there, too.
+        let is_held = said == ["drive 1", "drive 9"];
         for _ in 0..60 {
             let turned = (heading(scene) - before).abs().to_degrees() % 360.0;
             if turned.min(360.0 - turned) > 25.0 && page.text("#drive-said").is_empty() {
@@ -84,14 +84,14 @@ pub(crate) fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand(
     scene.wait_to_stand();
 }
 
-/// The keys of the document (G7, G8), and what each says.
+/// The keys of the document (G7, G8), each with its message to the panel.
 const KEYS: &[(&str, &str)] = &[
-    ("ArrowUp", "drive 2 200"),
-    ("ArrowDown", "drive 4 200"),
-    ("ArrowLeft", "drive 6 200"),
-    ("ArrowRight", "drive 7 200"),
-    ("PageUp", "drive 8 1000"),
-    ("PageDown", "drive 9 1000"),
+    ("ArrowUp", "drive 2"),
+    ("ArrowDown", "drive 4"),
+    ("ArrowLeft", "drive 6"),
+    ("ArrowRight", "drive 7"),
+    ("PageUp", "drive 8"),
+    ("PageDown", "drive 9"),
     ("1", "arm F1"),
     ("2", "arm F2"),
     ("q", "arm F3"),
@@ -114,13 +114,13 @@ pub(crate) fn each_key_says_what_the_document_says_once_and_nothing_in_text_fiel
     page.listen_in();
     page.moves();
     for (key, line) in KEYS {
-        // One that repeats has been pressed before.
+        // A key that repeats was pressed before.
         page.value(&format!(
             "dispatchEvent(new KeyboardEvent('keydown', {{ key: {}, repeat: true }}))",
             json!(key)
         ));
         assert_eq!(page.moves(), [""; 0], "{key}");
-        // A step before it may be under way still.
+        // The step before may still be running.
         let said = wait_for(line, || {
             press(page, &[key]);
             let said = page.moves();
@@ -133,7 +133,7 @@ pub(crate) fn each_key_says_what_the_document_says_once_and_nothing_in_text_fiel
         ));
         page.moves();
     }
-    // The keypad's division sign is a slash to a browser; the slash of the other keys is nothing.
+    // To a browser the keypad's division sign is a slash. The slash of the other keys does nothing.
     page.value("dispatchEvent(new KeyboardEvent('keydown', { key: '/', code: 'Slash' }))");
     page.pause();
     assert_eq!(page.moves(), [""; 0]);
@@ -143,7 +143,7 @@ pub(crate) fn each_key_says_what_the_document_says_once_and_nothing_in_text_fiel
         );
         (page.moves() == ["arm FA"]).then_some(())
     });
-    // Held, each is given again and again; a step is not.
+    // While a key is held, its command repeats; a step of the arm does not.
     page.wait_until("document.querySelector('#drive-said').textContent === ''");
     let mut said = 0;
     wait_for("a hold", || {
@@ -156,7 +156,7 @@ pub(crate) fn each_key_says_what_the_document_says_once_and_nothing_in_text_fiel
 
     page.pause();
     page.moves();
-    // In a field keys write, and in a list or a choice arrows choose.
+    // In a text field keys write, and in a list or a choice arrow keys choose.
     for field in ["#filter", "#robot", "#robot option", "#where [type=radio]"] {
         for (key, _) in KEYS {
             page.value(&format!(
@@ -176,7 +176,7 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
     scene.arm(page);
     scene.hold(page, "ArrowLeft");
     let frozen = scene.freeze_comm();
-    page.wait_for("#link", "nothing new for");
+    page.wait_for("#state", "r1 is not heard");
     page.wait_until("document.body.classList.contains('stale')");
     let grey = "['.robot path', '.good rect', '.ghost path', '.unsure'].every((part) => { \
                 const style = getComputedStyle(document.querySelector(`#map ${part}`)); \
@@ -191,14 +191,14 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
     assert_eq!(page.moves(), [""; 0]);
     page.key_up("ArrowLeft");
     drop(frozen);
-    page.wait_for("#link", "link ");
+    page.wait_for("#link", " ms");
     page.wait_until("!document.body.classList.contains('stale')");
     scene.assert_stands();
 
-    // Without the station it says since when, in sight and to a screen reader.
+    // Without the station the page says since when, on the screen and to a screen reader.
     page.value("window.WebSocket = class { close() {} }; tapped.close()");
-    page.wait_for("#link", "no connection to the station, last heard ");
-    page.wait_for("#link-said[role=status]", "no connection to the station");
+    page.wait_for("#state", "ast heard ");
+    page.wait_for("#told[role=alert]", "no connection to the station");
     page.wait_until("document.body.classList.contains('stale')");
     page.wait_until("document.querySelector('#control').disabled");
 }
@@ -207,19 +207,20 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
     scene: &mut Scene,
     page: &mut Page,
 ) {
-    // It is known where it stands at first.
-    page.click("#tab-drive");
+    // At first the robot knows its place.
+    scene.take_over(page);
     page.click("#where-ask");
     page.value("document.querySelector('#where-form').elements.at.value = 'delivery'");
     page.click("#where [type=submit]");
     page.wait_until("!document.querySelector('#where').open");
     page.wait_for("#map-text", "The robot is at (0, 0)");
-    scene.arm(page);
-    // A nudge is no drive.
+    page.click("#armed");
+    page.value("document.activeElement.blur()");
+    // After a drive by hand the robot does not know its place any more.
     scene.hold(page, "ArrowLeft");
     page.wait_for("#map-text", "not known where");
-    // It stays where it was seen last, in a circle that grows with what it is driven.
-    page.wait_for("#map text.lost", "place unknown");
+    // The map shows the last known place, in a circle that grows with the driven distance.
+    page.wait_for("#map .chip text", "place unknown");
     page.wait_until("!document.querySelector('#map .robot').hasAttribute('hidden')");
     let radius = "document.querySelector('#map .unsure').r.baseVal.value";
     let before = page.value(radius).as_f64().expect("a radius");
@@ -230,11 +231,11 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
     page.wait_until("document.querySelector('#where').open");
     assert_eq!(page.text("#mode"), "BY HAND");
 
-    // STOP in all its forms, in front of the question or not.
+    // STOP in all its forms, with the question open or not.
     let stops: [fn(&mut Page); 3] = [
         |page| page.key_down("Escape"),
         |page| page.click("#stop"),
-        // With a list that is open.
+        // With an open list.
         |page| {
             page.value("document.querySelector('#where [name=looks]').focus()");
             page.click("#where [name=looks]");
@@ -251,11 +252,11 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
         page.wait_until("document.querySelector('#resume').hidden");
     }
 
-    // What is wrong is said in the reader's language, beside it.
+    // The page shows an error beside the field, in the reader's language.
     page.fill("#where [name=x]", "99");
     page.click("#where [type=submit]");
     page.wait_for("#where-said", "column: a number from 0 to 2");
-    // A simulated robot is put where it is said to be.
+    // The simulated robot is moved to the place that the person enters.
     page.value(
         "(() => { const { x, y, looks } = document.querySelector('#where-form').elements; \
          [x.value, y.value, looks.value] = ['1', '1', 'up']; \
@@ -270,7 +271,7 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
         ((truth.x_mm - 500.0).abs() < 400.0 && (truth.y_mm - 500.0).abs() < 400.0).then_some(())
     });
 
-    // A field that is not used does not block, whatever stands in it.
+    // A field that is not used blocks nothing, whatever it contains.
     scene.by_hand(page);
     page.click("#where-ask");
     page.fill("#where [name=x]", "99");
@@ -283,7 +284,7 @@ pub(crate) fn by_hand_needs_the_wheel_and_asks_during_a_mission(
     scene: &mut Scene,
     page: &mut Page,
 ) {
-    // It drives by itself again, and fetches something.
+    // The robot drives by itself again, and fetches a product.
     page.wait_until("document.querySelector('#map-text').textContent.includes('It goes to')");
     page.listen_in();
     page.click("#tab-drive");
@@ -305,7 +306,7 @@ pub(crate) fn by_hand_needs_the_wheel_and_asks_during_a_mission(
     scene.wait_to_stand();
 }
 
-/// What is held, newest last, by the keys that were pressed.
+/// The held keys in the order of their presses, newest last.
 pub(crate) fn of_two_keys_the_newer_counts_and_then_the_older_again(
     scene: &mut Scene,
     page: &mut Page,
@@ -318,7 +319,7 @@ pub(crate) fn of_two_keys_the_newer_counts_and_then_the_older_again(
         ));
     };
     let said = |page: &mut Page| page.moves().pop().unwrap_or_default();
-    // A command that was held up is refused, which ends all that is held: a person begins anew.
+    // If a command was held up, it is refused and ends all holds; then a person begins again.
     wait_for("both keys to be heard", || {
         page.moves();
         let mut heard = Vec::new();
@@ -333,21 +334,14 @@ pub(crate) fn of_two_keys_the_newer_counts_and_then_the_older_again(
             key(page, kind, name);
             heard.push(said(page));
         }
-        let right = [
-            "drive 2 200",
-            "drive 6 200",
-            "drive 2 200",
-            "drive 7 200",
-            "",
-            "drive 1 200",
-        ];
-        // While a key is held its command may be given again at any moment.
+        let right = ["drive 2", "drive 6", "drive 2", "drive 7", "", "drive 1"];
+        // While a key is held, the page may repeat its command at any moment.
         let is_same = |(heard, right): (&String, &str)| {
-            heard == right || (right.is_empty() && heard == "drive 7 200")
+            heard == right || (right.is_empty() && heard == "drive 7")
         };
         let all = heard.iter().zip(right).all(is_same);
         if !all {
-            // Or the page has let go of all of it, and says why in a moment.
+            // Or the page has ended all holds, and shows the reason in a moment.
             page.wait_until("document.querySelector('#drive-said').textContent !== ''");
         }
         all.then_some(())
@@ -355,7 +349,7 @@ pub(crate) fn of_two_keys_the_newer_counts_and_then_the_older_again(
     scene.wait_to_stand();
 }
 
-/// A gamepad's entries, as the browser has them: identity, place, and how far the stick is bent.
+/// Gamepads as the browser gives them: name, index, and how far the stick is bent.
 const PADS: &str = "window.pads = []; navigator.getGamepads = () => pads; \
     window.entry = (id, index, y) => ({ id, index, connected: true, mapping: 'standard', \
       timestamp: performance.now(), axes: [0, y], buttons: [] })";
@@ -368,7 +362,7 @@ pub(crate) fn a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centre
     page.listen_in();
     page.value(PADS);
     let rest = || std::thread::sleep(std::time::Duration::from_millis(800));
-    // One that appears with its stick at its end.
+    // A gamepad that appears with a fully bent stick.
     page.value("pads = [entry('a', 0, -1)]");
     rest();
     assert_eq!(page.moves(), [""; 0], "it was never centred");
@@ -379,9 +373,7 @@ pub(crate) fn a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centre
             page.moves();
             page.value("pads[0].axes[1] = -1; pads[0].timestamp = performance.now()");
             std::thread::sleep(std::time::Duration::from_millis(300));
-            page.moves()
-                .contains(&"drive 2 200".to_owned())
-                .then_some(())
+            page.moves().contains(&"drive 2".to_owned()).then_some(())
         });
     };
     let ends: [(&str, &str); 4] = [
@@ -399,10 +391,10 @@ pub(crate) fn a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centre
     for (why, end) in ends {
         hold(page);
         page.value(end);
-        // What was given until the next picture has its end.
+        // By the next picture the page has ended the command.
         page.pause();
         let said = page.moves();
-        let is_over = said.last().is_none_or(|last| last == "drive 1 200");
+        let is_over = said.last().is_none_or(|last| last == "drive 1");
         assert!(is_over, "{why}: {said:?}");
         rest();
         assert_eq!(page.moves(), [""; 0], "{why}");
@@ -416,7 +408,7 @@ pub(crate) fn a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it(
 ) {
     scene.arm(page);
     scene.domain.done(&["stop"]);
-    page.wait_until("!document.querySelector('#halt').hidden");
+    page.wait_until("document.body.dataset.look === 'stopped'");
     wait_for("a refusal", || {
         press(page, &["ArrowLeft"]);
         page.pause();
@@ -432,7 +424,7 @@ pub(crate) fn a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it(
     page.wait_until("!document.querySelector('#drive-resume').hidden");
     let at = page.middle("#drive-resume");
     page.mouse("mousePressed", at);
-    page.wait_until("document.querySelector('#halt').hidden");
+    page.wait_until("document.body.dataset.look !== 'stopped'");
     page.mouse("mouseReleased", at);
     page.wait_until("document.querySelector('#drive-resume').hidden");
 }
@@ -449,6 +441,9 @@ pub(crate) fn in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_i
         const box = document.querySelector(part).getBoundingClientRect(); \
         return box.top >= 0 && box.bottom <= innerHeight && box.height > 50; })";
     assert_eq!(page.value(inside), json!([true, true, true]));
+    let free = "document.querySelector('#pad').getBoundingClientRect().bottom <= \
+        document.querySelector('#stop-place').getBoundingClientRect().top";
+    assert_eq!(page.value(free), true, "STOP covers the pad");
     for tab in ["missions", "drive", "setup", "line", "log"] {
         page.click(&format!("#tab-{tab}"));
         page.pause();
@@ -459,13 +454,19 @@ pub(crate) fn in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_i
              }).map((part) => part.id || part.name || part.textContent)",
         );
         assert_eq!(small, json!([]), "{tab}");
+        // STOP stays under the thumb, however far the page is scrolled, and covers nothing at its end.
+        page.value("scrollTo(0, document.documentElement.scrollHeight)");
+        page.pause();
+        let foot = "(() => { const box = (part) => document.querySelector(part).getBoundingClientRect(); \
+            return innerHeight - box('#stop').bottom < 24 && box('main').bottom <= box('#stop-place').top; })()";
+        assert_eq!(page.value(foot), true, "{tab}");
     }
 }
 
 pub(crate) fn whoever_lets_go_whatever_way_the_robot_stands(scene: &mut Scene, page: &mut Page) {
     scene.take_over(page);
 
-    // Not armed, a key is no more than a key.
+    // Until the box is ticked, an arrow key drives nothing.
     page.key_down("ArrowUp");
     scene.assert_stands();
     page.key_up("ArrowUp");
@@ -477,7 +478,7 @@ pub(crate) fn whoever_lets_go_whatever_way_the_robot_stands(scene: &mut Scene, p
     scene.wait_to_stand();
     scene.assert_stands();
 
-    // A finger.
+    // By a finger.
     page.touch("touchStart", "#pad-forward");
     scene.wait_to_move();
     page.touch("touchEnd", "#pad-forward");
@@ -488,7 +489,7 @@ pub(crate) fn whoever_lets_go_whatever_way_the_robot_stands(scene: &mut Scene, p
     scene.wait_to_stand();
     scene.assert_stands();
 
-    // The arm moves a step for each press, not while the robot drives, and letting go leaves it be.
+    // Each press moves the arm a step, but not while the robot drives; a release does nothing.
     let shoulder = "document.querySelectorAll('#arm-drawing text')[3].textContent";
     page.wait_until(&format!("Number({shoulder}) > 0"));
     let before = page.value(shoulder);
@@ -505,16 +506,16 @@ pub(crate) fn whoever_lets_go_whatever_way_the_robot_stands(scene: &mut Scene, p
         (page.value(shoulder) != before).then_some(())
     });
 
-    // The whole station is gone while a key is held, and the page comes back to its successor.
+    // The station is killed while a key is held, and the page connects to its successor.
     scene.hold(page, "ArrowUp");
     let station = scene.up.service("station").expect("it runs");
     kill_process(pid(station), Signal::KILL).expect("it runs");
     scene.wait_to_stand();
-    page.wait_for("#link", "link ");
+    page.wait_for("#link", " ms");
     scene.assert_stands();
     page.key_up("ArrowUp");
 
-    // A page that is loaded anew has let go, and has left the wheel.
+    // A reloaded page has ended its hold and given back the wheel.
     page.wait_for("#control", "Nobody drives");
     scene.take_over(page);
     scene.hold(page, "ArrowDown");
@@ -532,10 +533,10 @@ pub(crate) fn two_people_do_not_drive_at_once_and_either_may_stop(
     scene.take_over(anna);
     bo.click("#tab-drive");
     bo.wait_for("#control", "drives");
-    // Bo asks, and Anna keeps it.
+    // Bo asks for the wheel, and Anna keeps it.
     bo.click("#control");
     bo.wait_for("#drive-said", "has been asked for the wheel");
-    anna.wait_for("#asked", "asks for the wheel");
+    anna.wait_for("#asked", "guest 2 asks for the wheel");
     anna.click("#keep");
     bo.wait_for("#drive-said", "keeps the wheel");
     anna.wait_until("document.querySelector('#asked').hidden");
@@ -550,18 +551,27 @@ pub(crate) fn two_people_do_not_drive_at_once_and_either_may_stop(
     scene.hold(anna, "ArrowUp");
     bo.click("#stop");
     bo.wait_for("#stop-said", "both wheels stand");
+    // All pages show who stopped the robot, by a name that this person may choose.
+    anna.wait_for("#more", "By guest 2; both wheels stand");
     scene.assert_stands();
     anna.key_up("ArrowUp");
     scene.resume();
+    bo.fill("#name", "Bo");
+    wait_for("his name", || {
+        bo.click("#stop");
+        bo.pause();
+        anna.text("#more").contains("By Bo;").then_some(())
+    });
+    scene.resume();
 
-    // He asks again, and she hands it over.
+    // Bo asks again, and Anna gives him the wheel.
     bo.click("#control");
     anna.wait_for("#asked", "asks for the wheel");
     anna.click("#hand-over");
     bo.wait_for("#control", "You drive");
     anna.wait_for("#control", "drives");
 
-    // Whoever leaves it leaves it to anybody.
+    // After Bo gives back the wheel, anybody may take it.
     bo.click("#control");
     anna.wait_for("#control", "Nobody drives");
     anna.click("#control");

@@ -1,9 +1,9 @@
-//! The operator panel in a real browser, on a real simulated robot: whoever lets go, whatever way,
-//! the robot stands; a stop is confirmed; goods are fetched; two people do not drive at once.
+//! Tests of the operator panel in a real browser, with a simulated robot: it stands after every
+//! kind of release, a stop is confirmed, goods are fetched, two people do not drive at once.
 
 mod browser;
 mod driving;
-mod figures;
+mod fleet;
 mod manners;
 mod pictures;
 mod played;
@@ -12,34 +12,30 @@ mod releases;
 mod scene;
 mod setting_up;
 mod stopping;
-mod watched;
 
+use lager_orders::Sentence;
+use lager_sample::Coded;
 use lager_tests::wait_for;
 use lager_topics::{
-    Coded, FailureKind, Hold, Joint, LinkHealth, NavStatus, Phase, Remedy, StopCause, ThoughtKind,
+    FailureKind, Hold, Joint, LinkHealth, NavStatus, Phase, Remedy, StopCause, ThoughtKind,
 };
-use scene::{Scene, in_turn, parts};
+use scene::{Scene, each_alone};
 
-/// What the robot may tell is what the page has sentences for.
+/// The page has a sentence in both languages for everything that the robot may report.
 #[test]
 fn every_name_that_a_robot_tells_has_its_sentence() {
-    let sentences = include_str!("../../services/panel/page/sentences.js");
-    let (_, english) = sentences.split_once("  en: {").expect("a table");
-    let (english, _) = english.split_once("  sv: {").expect("two");
+    let table: Vec<&str> = Sentence::all().map(|sentence| sentence.name).collect();
     let mut missing = Vec::new();
     let mut look = |prefix: &str, variants: &mut dyn Iterator<Item = &str>| {
-        for variant in variants {
-            let key = format!("    {prefix}{}: \"", snake(variant));
-            if !english.contains(&key) {
-                missing.push(key);
-            }
-        }
+        let names = variants.map(|variant| format!("{prefix}{}", snake(variant)));
+        missing.extend(names.filter(|name| !table.contains(&name.as_str())));
     };
     look("thought", &mut names::<ThoughtKind>());
     look("failure", &mut names::<FailureKind>());
     look("remedy", &mut names::<Remedy>());
     look("phase", &mut names::<Phase>());
-    look("hold", &mut names::<Hold>());
+    // `None` needs no sentence: nothing holds the robot.
+    look("hold", &mut names::<Hold>().filter(|name| *name != "None"));
     look("stop_cause", &mut names::<StopCause>());
     look("joint", &mut names::<Joint>());
     assert!(missing.is_empty(), "{missing:#?}");
@@ -62,50 +58,33 @@ fn snake(name: &str) -> String {
         .collect()
 }
 
-#[test]
-fn while_it_drives_by_itself() {
-    in_turn(parts![
-        // It is on its way to product 1, far from where things are put.
-        setting_up::the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys,
-        setting_up::the_queue_is_reordered_and_what_is_taken_out_can_be_put_back,
-        setting_up::how_unsure_the_place_is_grows_until_the_next_mark,
-        manners::a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button,
-        manners::somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none,
-        manners::the_display_on_the_robot_stops_it,
-        stopping::stop_works_before_any_script_and_without_a_socket,
-        stopping::a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_not_shown,
-        stopping::one_press_on_fetch_is_one_order,
-        driving::by_hand_needs_the_wheel_and_asks_during_a_mission,
-        stopping::what_happens_to_the_robot_is_in_the_log_and_survives_the_station,
-        manners::stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop,
-        manners::the_words_are_swedish_for_who_reads_swedish,
-        setting_up::goods_and_obstacles_are_put_by_a_click_and_taken_back,
-    ]);
-}
-
-#[test]
-fn while_it_is_driven_by_hand() {
-    in_turn(parts![
-        // It stands on its tape until somebody drives it.
-        setting_up::gains_are_set_and_put_back_and_a_calibration_goes_step_by_step,
-        driving::whoever_lets_go_whatever_way_the_robot_stands,
-        driving::two_people_do_not_drive_at_once_and_either_may_stop,
-        driving::what_runs_once_is_not_cut_short_but_by_the_command_to_stand,
-        driving::each_key_says_what_the_document_says_once_and_nothing_in_text_fields,
-        driving::what_is_old_is_grey_with_its_time_and_drives_nothing,
-        driving::of_two_keys_the_newer_counts_and_then_the_older_again,
-        driving::a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centred,
-        driving::a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it,
-        driving::in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants,
-        driving::after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile,
-    ]);
-}
-
-#[test]
-fn while_hands_let_go() {
-    in_turn(parts![
-        releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
-    ]);
+each_alone! {
+    setting_up::the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys,
+    setting_up::the_queue_is_reordered_and_what_is_taken_out_can_be_put_back,
+    setting_up::how_unsure_the_place_is_grows_until_the_next_mark,
+    manners::a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button,
+    manners::somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none,
+    manners::the_display_on_the_robot_stops_it,
+    stopping::stop_works_before_any_script_and_without_a_socket,
+    stopping::a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_not_shown,
+    stopping::one_press_on_fetch_is_one_order,
+    driving::by_hand_needs_the_wheel_and_asks_during_a_mission,
+    stopping::what_happens_to_the_robot_is_in_the_log_and_survives_the_station,
+    manners::stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop,
+    manners::the_words_are_swedish_for_who_reads_swedish,
+    setting_up::goods_and_obstacles_are_put_by_a_click_and_taken_back,
+    setting_up::gains_are_set_and_put_back_and_a_calibration_goes_step_by_step,
+    driving::whoever_lets_go_whatever_way_the_robot_stands,
+    driving::two_people_do_not_drive_at_once_and_either_may_stop,
+    driving::what_runs_once_is_not_cut_short_but_by_the_command_to_stand,
+    driving::each_key_says_what_the_document_says_once_and_nothing_in_text_fields,
+    driving::what_is_old_is_grey_with_its_time_and_drives_nothing,
+    driving::of_two_keys_the_newer_counts_and_then_the_older_again,
+    driving::a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centred,
+    driving::a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it,
+    driving::in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants,
+    driving::after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile,
+    releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
 }
 
 #[test]
@@ -113,10 +92,10 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     let mut scene = Scene::new(4.0, &[]);
     let mut page = scene.page();
     let mut status = scene.bus.subscriber::<NavStatus>().expect("a topic");
-    // A person is to pick, and changes his mind when the robot stands at the goods.
+    // The person chooses to pick by hand, and changes that when the robot stands at the goods.
     page.click("#picks");
     page.wait_until("!document.querySelector('#picks').checked");
-    // On the short way to product 2, while the robot fetches product 1.
+    // Puts a thing on the short way to product 2 while the robot fetches product 1.
     page.click_at_mm(0.0, 750.0);
     page.wait_for("#map-said", "obstacle put");
     page.value("document.querySelector('#goods').value = '2'");
@@ -124,18 +103,18 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     wait_for("it to wait or to be under way", || {
         page.text("#queue").contains('2').then_some(())
     });
-    // Where it is drawn moves with where it is.
+    // Its drawing moves as the robot does.
     let place = "document.querySelector('#map .robot').getAttribute('transform')";
     let before = page.value(place);
     wait_for("the picture to move", || {
         (page.value(place) != before).then_some(())
     });
-    page.wait_for("#doing", "stands at the goods");
+    page.wait_for("#state", "stands at the goods");
     page.click("#picks");
     page.wait_until("document.querySelector('#picks').checked");
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
 
-    // A page that is loaded anew in the middle of a mission knows as much.
+    // A page that is reloaded in the middle of a mission shows the same.
     page.call("Page.reload", &serde_json::json!({}));
     page.wait_for("#link", " ms");
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
@@ -144,7 +123,7 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
         (status.delivered == 2).then_some(())
     });
     page.wait_until("document.querySelectorAll('#history li').length === 2");
-    // The second had to go round what was put there; the station knows it for whoever comes later.
+    // The robot had to drive around the thing; the station keeps that for later pages.
     let history = page.text("#history");
     assert!(
         history.contains("round what was blocked: (0, "),
@@ -166,7 +145,7 @@ fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
     let (_, rest) = station
         .split_once("listens at ")
         .expect("the station's address");
-    // Behind it may stand why it is not the usual one.
+    // After it the line may say why this is not the usual address.
     let address = rest.split([' ', ',', '\n']).next().expect("an address");
     let second = scene
         .domain
@@ -177,7 +156,7 @@ fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
          list.dispatchEvent(new Event('change')); })()",
     );
     page.wait_for("#link", " ms");
-    // The address keeps which one is shown, and STOP says whom it stops.
+    // The page's address keeps the chosen robot, and STOP names the robot that it stops.
     page.call("Page.reload", &serde_json::json!({}));
     page.wait_for("#link", " ms");
     page.wait_until("document.querySelector('#stop-whom').textContent === 'r2'");
@@ -199,10 +178,10 @@ fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
     };
     assert_eq!((stopped("r1"), stopped("r2")), (0, 1));
     scene.domain.done(&["--name", "r2", "resume"]);
-    // One press for all of them.
+    // One press stops all robots.
     page.click("#stop-all");
-    page.wait_for("#stop-said", "r1 stands after");
-    page.wait_for("#stop-said", "r2 stands after");
+    page.wait_for("#stop-said", "r1: both wheels stand after");
+    page.wait_for("#stop-said", "r2: both wheels stand after");
     assert_eq!((stopped("r1"), stopped("r2")), (1, 1));
     scene.domain.done(&["--name", "r2", "resume"]);
     scene.resume();

@@ -1,5 +1,5 @@
-//! Pictures of the panel's views: each in both themes, on a laptop and in the hand, one on a large
-//! screen. What a simulated robot is hard to bring to is told by one that is played.
+//! Takes pictures of the panel's views: each in both themes, on a laptop and on a phone, one on a
+//! large screen. Played robots show states that a simulated robot hardly gets into.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -9,11 +9,11 @@ use crate::Scene;
 use crate::browser::Page;
 use crate::played::Stage;
 
-/// Name, width and height in pixels, whether it is in the hand.
+/// Name, width and height in pixels, and whether the screen is held in the hand.
 const SCREENS: [(&str, u32, u32, bool); 2] =
     [("laptop", 1280, 720, false), ("phone", 360, 740, true)];
 
-/// Takes one view as it is now.
+/// Takes a picture of the current view.
 fn view(page: &mut Page, name: &str) {
     for (screen, width, height, in_hand) in SCREENS {
         for theme in ["light", "dark"] {
@@ -27,7 +27,7 @@ fn view(page: &mut Page, name: &str) {
 fn take(page: &mut Page, name: &str) {
     let folder = PathBuf::from(std::env::var_os("LAGER_PICTURES").expect("LAGER_PICTURES"));
     page.value("document.activeElement?.blur()");
-    // What is drawn is drawn anew five times a second.
+    // The page redraws its drawings five times a second.
     std::thread::sleep(Duration::from_millis(400));
     let file = folder.join(format!("{name}.png"));
     std::fs::write(&file, page.picture()).expect("a folder that can be written to");
@@ -52,7 +52,7 @@ fn of_every_view() {
         view(&mut page, tab);
     }
     page.click("#tab-missions");
-    page.wait_for("#doing", "stands at the goods");
+    page.wait_for("#state", "stands at the goods");
     view(&mut page, "picking");
     page.key_down("Escape");
     page.key_up("Escape");
@@ -61,7 +61,7 @@ fn of_every_view() {
     scene.resume();
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
     view(&mut page, "blocked");
-    // For eyes that see some colours alike, or none.
+    // As seen by people who cannot tell some colours apart, or see none.
     for eyes in ["protanopia", "deuteranopia", "tritanopia", "achromatopsia"] {
         let params = serde_json::json!({ "type": eyes });
         page.call("Emulation.setEmulatedVisionDeficiency", &params);
@@ -70,10 +70,10 @@ fn of_every_view() {
     let params = serde_json::json!({ "type": "none" });
     page.call("Emulation.setEmulatedVisionDeficiency", &params);
     let frozen = scene.freeze_comm();
-    page.wait_for("#link", "nothing new for");
+    page.wait_for("#state", "r1 is not heard");
     view(&mut page, "link-lost");
     drop(frozen);
-    page.wait_for("#link", "link ");
+    page.wait_for("#link", " ms");
     scene.take_over(&mut page);
     view(&mut page, "by-hand");
     let mut other = scene.page();
@@ -98,7 +98,7 @@ const SMALL: &str = "size = [2, 3]\nside_length_cm = 50\ndelivery = [0, 0]\n\
     [[product]]\nid = 1\nname = \"matches\"\nsquare = [1, 1]\nside = \"left\"\n\
     [[product]]\nid = 2\nname = \"nails\"\nsquare = [0, 2]\nside = \"right\"\n";
 
-/// A robot at a place that does something, with boards that are heard unless `more` says otherwise.
+/// A robot's state line; `more` adds what the robot does, and boards that do not report.
 fn state(more: &str) -> String {
     format!(
         "state time_ms=81250 node=1,1 looks=up delivered=3 line_bits=00001110000 line_error=0 \
@@ -116,7 +116,7 @@ const DRIVES: &str = "x_mm=500 y_mm=760 heading_deg=0 unsure_mm=24 next=1,2 phas
 fn of_what_is_rare() {
     let stage = Stage::new(None);
     let mut page = stage.page(&stage.url);
-    page.wait_for("#link", "No robot has connected yet");
+    page.wait_for("#state", "No robot has connected yet");
     view(&mut page, "first-start");
     page.click("#tab-setup");
     view(&mut page, "empty-warehouse");
@@ -139,7 +139,7 @@ fn of_what_is_rare() {
     let drives = robot(DRIVES);
     let mut page = stage.page(&viewer);
     page.wait_for("#driver", "you may look and stop");
-    page.wait_for("#link", "link ");
+    page.wait_for("#link", " ms");
     view(&mut page, "viewer");
     let second = stage.robot("r2", &[&state(&DRIVES.replace("x_mm=500", "x_mm=0"))]);
     page.wait_until("document.querySelectorAll('#robot option').length === 2");
@@ -155,14 +155,14 @@ fn of_what_is_rare() {
         "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=unheard remedy=report \
          mode=autonomous pick=auto stopped=0 order=4 product=2 sensor_up=1 steering_up=0",
     );
-    page.wait_for("#doing", "the steering board does not report");
+    page.wait_for("#state", "the steering board does not report");
     view(&mut page, "board-lost");
     now(
         "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=battery remedy=charge \
          mode=autonomous pick=auto stopped=0 order=4 product=2 left_duty=0 right_duty=0 \
          code=00000001 battery_dv=98 sensor_up=1 steering_up=1",
     );
-    page.wait_for("#doing", "the battery is low");
+    page.wait_for("#state", "the battery is low");
     view(&mut page, "battery-low");
     now(
         "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=waiting_for_order hold=none \
@@ -187,8 +187,34 @@ fn of_what_is_rare() {
     let far = "route 12 14 13 14 14 13 14 12 14 11 14 10 14 9 14 8 14 7 14 7 15 7 16 6 16";
     let robot = stage.robot("r1", &[&state.replace("next=1,2", "next=14,13"), far]);
     let mut page = stage.page(&stage.url);
-    page.wait_for("#link", "link ");
+    page.wait_for("#link", " ms");
     view(&mut page, "large");
     drop((page, robot));
+    stage.end();
+}
+
+#[test]
+#[ignore = "it makes pictures: tests/screenshots"]
+fn of_several_robots() {
+    let stage = Stage::new(Some(SMALL));
+    let at = |x_mm: u32, more: &str| {
+        let drives = DRIVES.replace("x_mm=500", &format!("x_mm={x_mm}"));
+        state(&format!("{drives} {more}"))
+    };
+    let lines = [
+        at(500, ""),
+        at(1_000, "").replace("steering_up=1", "steering_up=0"),
+        at(0, "").replace("stopped=0", "stopped=1 stop_cause=ordered stop_by=comm"),
+    ];
+    let names = ["r1", "r2", "r3"];
+    let robots = names.map(|name| {
+        let line = lines[usize::from(name.as_bytes()[1] - b'1')].as_str();
+        stage.robot(name, &[line, "queue 2 5 1 6 2"])
+    });
+    let mut page = stage.page(&stage.url.replacen("/?", "/?r1&", 1));
+    page.wait_until("document.querySelectorAll('#map .other').length === 2");
+    page.click("#tab-fleet");
+    view(&mut page, "fleet");
+    drop((page, robots));
     stage.end();
 }

@@ -1,5 +1,5 @@
-//! A station without a robot of this machine, and robots that are played by their lines: for what a
-//! simulated one cannot be brought to, or not in time.
+//! A station with played robots, which only send their lines, for states that a simulated robot
+//! cannot reach, or not in time.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
@@ -12,19 +12,19 @@ use lager_tests::{Domain, Running, wait_for};
 
 use crate::browser::{Browser, Page};
 
-/// A station with its panel and a browser at it.
+/// A station with its panel, and a browser.
 pub(crate) struct Stage {
     pub(crate) url: String,
-    /// The address of who may look and stop.
+    /// The address for people who may look and stop.
     pub(crate) viewer: String,
     robots: String,
-    browser: Browser,
+    pub(crate) browser: Browser,
     station: Running,
     domain: Domain,
 }
 
 impl Stage {
-    /// One that knows this warehouse, a file of TOML, if any.
+    /// A stage whose station knows this warehouse, a file of TOML, if there is one.
     pub(crate) fn new(warehouse: Option<&str>) -> Self {
         let domain = Domain::new();
         let here = "127.0.0.1:0";
@@ -64,7 +64,7 @@ impl Stage {
         page
     }
 
-    /// A robot that says these lines twenty times a second.
+    /// Starts a robot that sends these lines twenty times a second.
     pub(crate) fn robot(&self, name: &str, lines: &[&str]) -> Played {
         Played::new(&self.robots, name, lines)
     }
@@ -81,7 +81,7 @@ impl Stage {
     }
 }
 
-/// A robot that is played until it is dropped.
+/// A played robot; dropping it ends it.
 pub(crate) struct Played {
     lines: Arc<Mutex<Vec<String>>>,
     over: Arc<AtomicBool>,
@@ -104,7 +104,7 @@ impl Played {
                 writeln!(stream, "{lines}").expect("the station listens");
                 match stream.read(&mut [0; 4096]).map_err(|error| error.kind()) {
                     Ok(0) => return,
-                    // What it is told it does not do.
+                    // It carries out no command.
                     Ok(_) => std::thread::sleep(Duration::from_millis(50)),
                     Err(ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
                     Err(other) => panic!("{other}"),
@@ -118,7 +118,7 @@ impl Played {
         }
     }
 
-    /// It says something else from now on.
+    /// From now on it sends these lines.
     pub(crate) fn says(&self, lines: &[&str]) {
         let lines = lines.iter().map(|line| (*line).to_owned()).collect();
         *self.lines.lock().expect("nobody fails") = lines;

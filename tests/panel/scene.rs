@@ -1,36 +1,30 @@
-//! A robot that is up with its panel, a browser at it, and what really happens.
+//! The scene of the panel's tests: a running robot with its panel, a browser, and the true world.
 
-use lager_ports::{Bus, Clock, Subscriber};
+use lager_home::Clock;
+use lager_ports::{Bus, Subscriber};
 use lager_tests::{Domain, Running, pid, wait_for};
 use lager_topics::TruthPose;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::browser::{Browser, Page};
 
-/// What is tested on a robot that others have been tested on, with a page of its own.
-pub(crate) type Part = fn(&mut Scene, &mut Page);
-
-/// The functions by their names.
-macro_rules! parts {
-    ($($part:path),* $(,)?) => { &[$((stringify!($part), $part as $crate::scene::Part)),*] };
+/// Makes each function a test with its own robot and page.
+macro_rules! each_alone {
+    ($($file:ident::$test:ident),* $(,)?) => { $(
+        #[test]
+        fn $test() {
+            let mut scene = $crate::Scene::among_others();
+            let mut page = scene.page();
+            $crate::$file::$test(&mut scene, &mut page);
+            page.close();
+            scene.end();
+        }
+    )* };
 }
 
-pub(crate) use parts;
+pub(crate) use each_alone;
 
-/// Tests one part after the other on one robot, which takes its time to start and to end.
-pub(crate) fn in_turn(parts: &[(&str, Part)]) {
-    let mut scene = Scene::new(1.0, &[]);
-    for (name, part) in parts {
-        // The one that fails is the last one that is told.
-        println!("{name}");
-        let mut page = scene.page();
-        part(&mut scene, &mut page);
-        page.close();
-    }
-    scene.end();
-}
-
-/// A robot that is up with its panel, and what really happens.
+/// A running robot with its panel, and the true state of its world.
 pub(crate) struct Scene {
     pub(crate) truth: Subscriber<TruthPose>,
     pub(crate) bus: Bus,
@@ -40,7 +34,7 @@ pub(crate) struct Scene {
     pub(crate) domain: Domain,
 }
 
-/// A comm that is frozen until this is dropped.
+/// A frozen comm; dropping this lets it run again.
 pub(crate) struct FrozenComm([Pid; 3]);
 
 impl Drop for FrozenComm {
@@ -53,7 +47,15 @@ impl Drop for FrozenComm {
 
 impl Scene {
     pub(crate) fn new(speed: f64, more: &[&str]) -> Self {
-        let domain = Domain::new();
+        Self::on(Domain::new(), speed, more)
+    }
+
+    /// A robot beside which other tests may drive theirs.
+    pub(crate) fn among_others() -> Self {
+        Self::on(Domain::among_others(), 1.0, &[])
+    }
+
+    fn on(domain: Domain, speed: f64, more: &[&str]) -> Self {
         let speed_word = speed.to_string();
         let mut args = vec!["up", "--panel", "127.0.0.1:0", "--speed", &speed_word];
         args.extend(more);
@@ -98,7 +100,7 @@ impl Scene {
         wait_for("the robot to stand", || self.moves().filter(|moves| !moves));
     }
 
-    /// It stands in all that the world shows from now on, for a while.
+    /// Asserts that the robot stands for a while in every sample of the world.
     pub(crate) fn assert_stands(&mut self) {
         let from = Clock::monotonic_ns();
         let mut seen = 0;
@@ -113,7 +115,7 @@ impl Scene {
         }
     }
 
-    /// Takes the wheel and turns the robot over to the hand.
+    /// Takes the wheel and sets the manual mode.
     pub(crate) fn take_over(&mut self, page: &mut Page) {
         page.click("#tab-drive");
         page.click("#control");
@@ -122,10 +124,10 @@ impl Scene {
         self.wait_to_stand();
     }
 
-    /// Turns it over to the hand of a page that has the wheel.
+    /// Sets the manual mode from a page that has the wheel.
     pub(crate) fn by_hand(&self, page: &mut Page) {
         page.click("#manual");
-        // One that is on its way is asked about first.
+        // For a robot on its way, the page asks first.
         wait_for("the mode to be the hand's", || {
             if page.value("document.querySelector('#hand').hidden") == false {
                 page.click("#hand-now");
@@ -134,14 +136,14 @@ impl Scene {
         });
     }
 
-    /// Takes the wheel, and lets keys and buttons drive.
+    /// Takes the wheel, and turns driving by keys and buttons on.
     pub(crate) fn arm(&mut self, page: &mut Page) {
         self.take_over(page);
         page.click("#armed");
         page.value("document.activeElement.blur()");
     }
 
-    /// Presses a key until the robot moves by it: a person whose order was held up presses anew.
+    /// Presses a key until the robot moves by it; if an order was held up, presses again.
     pub(crate) fn hold(&mut self, page: &mut Page, key: &str) {
         wait_for("the robot to be driven", || {
             page.key_down(key);
@@ -156,7 +158,7 @@ impl Scene {
         });
     }
 
-    /// Freezes comm, and those who supervise: they would replace one that is silent for two seconds.
+    /// Freezes comm and the supervisor, which would replace a comm that is silent for 2 s.
     pub(crate) fn freeze_comm(&self) -> FrozenComm {
         let service = |name: &str| pid(self.up.service(name).expect("it runs"));
         let frozen = FrozenComm([pid(self.up.pid()), service("attend"), service("comm")]);
@@ -166,7 +168,7 @@ impl Scene {
         frozen
     }
 
-    /// What the page has seen can be had as a table and as a recording, which others can read.
+    /// Tests that the page saves its history as a table and as a recording that others can read.
     pub(crate) fn saves(&self, page: &mut Page) {
         let folder = self.domain.folder();
         page.wait_for("#link", " ms");
@@ -178,10 +180,10 @@ impl Scene {
             // The browser makes the file before it fills it.
             text.ends_with('\n').then_some(text)
         });
-        // What has a unit says which.
+        // Each column with a unit names it.
         let units = "time,x_mm,y_mm,line_error_half_sensors,left_duty_of_255,right_duty_of_255,";
         assert!(table.starts_with(units), "{table}");
-        // No page knows more than it has seen, and it says how much that is.
+        // A page saves only what it has seen, and says how long that was.
         page.wait_until("/^Save CSV \\d/.test(document.querySelector('#save-csv').textContent)");
         let (head, lines) = table.split_once('\n').expect("lines");
         for key in [
@@ -196,7 +198,7 @@ impl Scene {
         ] {
             assert!(head.split(',').any(|name| name == key), "{key}: {head}");
         }
-        // Rows of numbers stand in quotation marks, so that each line has as many cells.
+        // Lists of numbers are in quotation marks, so all lines have the same number of cells.
         let cells = |line: &str| {
             let outside: String = line.split('"').step_by(2).collect();
             outside.matches(',').count()
@@ -221,7 +223,7 @@ impl Scene {
         );
     }
 
-    /// Nothing is left of a stop.
+    /// Releases a stop, if there is one.
     pub(crate) fn resume(&self) {
         self.domain.done(&["resume"]);
     }

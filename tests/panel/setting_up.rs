@@ -1,6 +1,6 @@
-//! Setting up and ordering from the page: the warehouse by form, file and strings, the line
-//! control's gains, the calibration, the queue, the goods that cannot be reached, and the map's own
-//! controls.
+//! Tests of setting up and ordering from the page: the warehouse by form, file and strings, the
+//! gains of the line control, the calibration, the queue, goods that cannot be reached, and the
+//! controls of the map.
 
 use lager_tests::wait_for;
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::Scene;
 use crate::browser::Page;
 use crate::played::Stage;
 
-/// The texts of all elements that fit, with commas.
+/// The texts of all elements that match, with commas between them.
 fn texts(page: &mut Page, selector: &str) -> String {
     let all = page.value(&format!(
         "[...document.querySelectorAll({})].map(({{ textContent }}) => textContent).join()",
@@ -20,7 +20,7 @@ fn texts(page: &mut Page, selector: &str) -> String {
 
 #[test]
 fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
-    // A robot that waits, so that another warehouse disturbs nobody.
+    // The robot waits, so another warehouse disturbs no drive.
     let scene = Scene::new(1.0, &["--mission", "3"]);
     let mut page = scene.page();
     let folder = scene.domain.folder().to_owned();
@@ -38,7 +38,7 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     });
     assert_eq!(before["size"], json!([2, 2]));
 
-    // Size, corner and side by the form: what is typed is drawn once it is saved.
+    // Size, corner and side by the form; the map shows them when they are saved.
     page.fill("#warehouse [name=width]", "4");
     page.fill("#warehouse [name=height]", "5");
     page.fill("#warehouse [name=side]", "60");
@@ -57,7 +57,7 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
     page.fill("#goods-string", "7,1,0,3;8,2,1,0");
     page.wait_for("#map-text", "Goods: 7 (1, 0) down; 8 (2, 1) left.");
-    // A string that is pasted and ended by Enter is taken, and not what the form had before.
+    // The page takes a string that is pasted and ended by Enter, not the form's old values.
     page.value("document.querySelector('#map-string').focus(); document.querySelector('#map-string').select()");
     page.call("Input.insertText", &json!({ "text": "3,4,0,4" }));
     let enter = json!({ "type": "keyDown", "key": "Enter", "code": "Enter", "text": "\r", "windowsVirtualKeyCode": 13 });
@@ -73,12 +73,12 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     page.wait_until("document.querySelector('#setup-said').textContent.length > 5");
     assert!(page.text("#map-text").contains("3 by 2 squares"));
 
-    // The file that was saved makes it what it was.
+    // The saved file restores the warehouse.
     let document = page.call("DOM.getDocument", &json!({}));
     let query = json!({ "nodeId": document["root"]["nodeId"], "selector": "#load-file" });
     let node = page.call("DOM.querySelector", &query)["nodeId"].clone();
     let file = folder.join("warehouse.json");
-    // The same file once more after it was undone.
+    // Loads the same file again after the change was undone.
     for is_last in [false, true] {
         page.call(
             "DOM.setFileInputFiles",
@@ -92,7 +92,7 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
             page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
         }
     }
-    // A number that is left out is no 0.
+    // An empty number field does not count as 0.
     page.fill("#products [name=id]", "");
     assert_eq!(
         page.value("document.querySelector('#warehouse').checkValidity()"),
@@ -120,12 +120,12 @@ pub(crate) fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step(
     page.click("#gains-back");
     page.wait_for("#gains-now", "now 3 and 4");
 
-    // It stands still on its tape, so no sensor sees both: the board says so, sensor by sensor.
+    // It stands still on its tape, so no sensor sees both, and the board says so for each sensor.
     page.click("#calibrate");
     page.wait_for("#calibration [aria-current]", "move it slowly");
     page.wait_for("#calibration-said", "Calibrating");
     page.wait_until("document.querySelectorAll('#calibration-sensors .on').length > 0");
-    // Meanwhile it tells what each of them reads: more over tape than over floor.
+    // Meanwhile the board reports each sensor's reading: higher over tape than over floor.
     page.wait_until(
         "(() => { const read = (select) => [...document.querySelectorAll(`#calibration-sensors ${select}`)] \
            .map(({ textContent }) => Number(textContent)); \
@@ -141,7 +141,7 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
     page: &mut Page,
 ) {
     scene.wait_to_move();
-    // It stays where it is, with product 1 under way.
+    // The robot stays in its place, with product 1 as its order.
     page.key_down("Escape");
     page.key_up("Escape");
     page.wait_for("#stop-said", "both wheels stand");
@@ -149,14 +149,14 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
         page.fill("#goods", product);
         page.click("#fetch button");
     };
-    // The number of each waiting order is all of its text but the buttons.
+    // Without its buttons, a waiting order's text is only its number.
     let waiting = "[...document.querySelectorAll('#queue .waiting')].map((line) => \
                    line.firstChild.textContent).join()";
     for (product, queue) in [("2", "2"), ("3", "2,3")] {
         order(page, product);
         page.wait_until(&format!("{waiting} === '{queue}'"));
     }
-    // What waits or is under way is not fetched twice, and the reason stands beside the button.
+    // A product that already has an order cannot get a second; the page shows the reason there.
     for product in ["1", "3"] {
         order(page, product);
         page.wait_for(
@@ -196,18 +196,18 @@ fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     let mut page = scene.page();
     page.click("#picks");
     page.wait_until("!document.querySelector('#picks').checked");
-    // A person says that he has picked: refused while the claw is empty, unless he insists.
-    page.wait_for("#doing", "stands at the goods");
+    // "Picked" from a person is refused while the claw is empty, unless the person insists.
+    page.wait_for("#state", "stands at the goods");
     page.click("#picked");
     page.wait_until("document.querySelector('#missions-said').textContent.length > 5");
     page.click("#picked-force");
     wait_for("it to leave", || {
-        (!page.text("#doing").contains("stands at the goods")).then_some(())
+        (!page.text("#state").contains("stands at the goods")).then_some(())
     });
     page.wait_for("#history li", " in ");
     assert!(texts(&mut page, "#history li").contains('3'));
 
-    // An order that is under way is taken back as long as its goods are not in the claw.
+    // An order can be cancelled as long as its goods are not in the claw.
     page.fill("#goods", "2");
     page.click("#fetch button");
     page.wait_for("#queue li", "2  under way");
@@ -235,15 +235,15 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
     };
     now("phase=waiting_for_order failure=no_way failure_expected=0 failure_seen=0 remedy=way");
     page.wait_for("#map .good.out-of-reach .why", "no way there");
-    page.wait_for("#doing", "There is no way from (1, 1) to where I must go");
+    page.wait_for("#state", "There is no way from (1, 1) to where I must go");
     page.wait_for("#queue li", "2 nails  under way");
     now("phase=driving sensor_up=0 steering_up=1");
-    page.wait_for("#doing", "the sensor board is not heard");
+    page.wait_for("#state", "he sensor board is not heard");
     page.click("#language");
-    page.wait_for("#doing", "sensorkortet hörs inte");
+    page.wait_for("#state", "ensorkortet hörs inte");
     page.wait_until("document.querySelector('#map .out-of-reach') === null");
 
-    // While it calibrates, each sensor that has seen tape and floor is marked.
+    // During the calibration the page marks each sensor that has seen tape and floor.
     page.click("#language");
     page.click("#tab-line");
     page.click("#calibrate");
@@ -267,12 +267,12 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
     let height = "document.querySelector('#calibration-sensors .stretch').style.height";
     assert_eq!(page.value(height), "78.4%", "of 255");
 
-    // A robot that goes without an answer may have been stopped or not.
+    // A robot that disappears before it answers may be stopped or not.
     page.click("#tab-missions");
     page.click("#stop");
     page.wait_for("#stop-said", "not confirmed");
     drop(robot);
-    page.wait_for("#link", "no link, last heard");
+    page.wait_for("#state", "r1 is not heard");
     page.pause();
     assert!(page.text("#stop-said").contains("not confirmed"));
     drop(page);
@@ -290,7 +290,7 @@ pub(crate) fn how_unsure_the_place_is_grows_until_the_next_mark(
          .observe(document.querySelector('#map .unsure'), { attributes: true, attributeFilter: ['r'] })",
     );
     page.wait_until("document.querySelector('#map .trail polyline').points.numberOfItems > 1");
-    // It grows step by step, and a mark makes it small at once.
+    // The circle grows step by step, and a mark makes it small at once.
     page.wait_until(
         "radii.some((radius, index) => index > 3 && radius < radii[index - 1] - 3 && \
          radii[index - 1] > radii[index - 2] && radii[index - 2] > radii[index - 3])",
@@ -331,7 +331,7 @@ pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put
     assert!(view(page)[2] < right[2]);
     page.click("#fit");
 
-    // Two fingers that part.
+    // Two fingers that move apart.
     let (x, y) = page.middle("#map");
     let fingers = |page: &mut Page, kind: &str, apart: f64| {
         let points = match kind {
@@ -352,7 +352,7 @@ pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put
     assert!(zoomed[2] < fitted[2] * 0.7, "{zoomed:?} {fitted:?}");
     assert_eq!(page.text("#map-said"), "", "nothing was put by it");
 
-    // It follows the robot until somebody moves it.
+    // The map follows the robot until a person moves the map.
     scene.wait_to_move();
     page.click("#follow");
     let before = view(page);
@@ -363,8 +363,8 @@ pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put
         "false"
     );
 
-    // Beside every way there is nothing to put, and it says so; a way in the middle takes it by
-    // Enter.
+    // Beside the ways a thing cannot be put, and the page says so. With a way in the middle, Enter
+    // puts a thing there.
     page.click("#fit");
     page.click_at_mm(250.0, 250.0);
     page.wait_for("#map-said", "there is no way");
@@ -374,7 +374,7 @@ pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put
          map.dispatchEvent(new WheelEvent('wheel', { deltaY: -1, clientX: at.x, clientY: at.y, cancelable: true })); })()",
     );
     page.click("#fit");
-    // The middle of the fitted view is moved onto the way from (1, 1) upwards, key by key.
+    // Arrow keys move the middle of the fitted view onto the way from (1, 1) upwards.
     for _ in 0..40 {
         let [left, top, width, height] = view(page)[..] else {
             panic!()
@@ -411,7 +411,7 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     let goods = "[...document.querySelectorAll('#goods option')].map(({ value }) => value).join()";
     page.wait_until(&format!("{goods} === '1,2,3'"));
 
-    // While the warehouse is set up, a click in a square places goods at its nearest side.
+    // In the set-up view, a click in a square places goods at the square's nearest side.
     page.click("#tab-setup");
     page.click_at_mm(250.0, 420.0);
     page.wait_until(&format!("{goods} === '1,2,3,4'"));
@@ -421,12 +421,12 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     page.click("#undo");
     page.wait_until(&format!("{goods} === '1,2,3'"));
 
-    // What cannot be is said beside it, and nothing is changed.
+    // The page shows why an entry is impossible beside it, and changes nothing.
     page.fill("#goods-string", "7,1,0,4");
     page.wait_for("#setup-said", "7,1,0,4");
     assert_eq!(page.value(goods), "1,2,3");
 
-    // Goods are described, too, and what is wrong is said as one types.
+    // Goods are entered here too, and the page shows mistakes while a person types.
     page.click("#add-product");
     page.fill("#products [name=id]", "3");
     page.wait_for("#setup-said", "two goods have the number 3");
@@ -441,11 +441,11 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
         "document.querySelector('#map [data-product=\"12\"] title').textContent === '12 nails'",
     );
 
-    // Otherwise a click on a way puts something there.
+    // In other views a click on a way puts a thing there.
     page.click("#tab-missions");
     page.click_at_mm(750.0, 1_000.0);
     page.wait_for("#map-said", "obstacle put");
-    // It is drawn at once, in another way than what the robot finds blocked.
+    // The map shows it at once, and not like a way that the robot finds blocked.
     let placed = "document.querySelectorAll('#map .placed').length";
     page.wait_until(&format!("{placed} === 1"));
     page.wait_for("#map-text", "Obstacles stand at:");
@@ -453,11 +453,11 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     page.wait_for("#map-said", "obstacle taken away");
     page.wait_until(&format!("{placed} === 0"));
 
-    // No warehouse is saved that no robot drives in.
+    // The page does not save a warehouse in which no robot can drive.
     page.click("#tab-setup");
     for (field, value, why, right) in [
         ("width", "255", "a number from 1 to 99", "2"),
-        ("side", "1", "a number from 40 to 65535", "50"),
+        ("side", "1", "a number from 40 to 500", "50"),
     ] {
         let field = format!("#warehouse [name={field}]");
         page.fill(&field, value);
@@ -471,26 +471,4 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
         "the robot knows up to 99 squares along a side; here are 100",
     );
     page.value("document.querySelector('#setup-said').textContent = ''");
-}
-
-/// The page's limits are the robot's.
-#[test]
-fn what_the_page_lets_set_up_is_what_a_robot_drives_in() {
-    let script = include_str!("../../services/panel/page/setup.js");
-    let form = include_str!("../../services/panel/page/index.html");
-    let (crossings, side) = (lager_logic::map::MAX_SIDE, lager_logic::map::MIN_SIDE_CM);
-    for line in [
-        format!("const MOST_CROSSINGS = {crossings};"),
-        format!("const LEAST_SIDE_CM = {side};"),
-        format!("const MOST_GOODS = {};", lager_logic::map::MAX_STATIONS),
-    ] {
-        assert!(script.contains(&line), "{line}");
-    }
-    assert_eq!(
-        form.matches(&format!("max=\"{}\"", crossings - 1)).count(),
-        2
-    );
-    assert!(form.contains(&format!(
-        "name=\"side\" placeholder=\"40\" type=\"number\" min=\"{side}\""
-    )));
 }

@@ -1,4 +1,4 @@
-//! STOP at any time and for the right robot; what is kept of it; and one press that is one order.
+//! Tests of STOP at any time and for the right robot, of its traces, and of double presses.
 
 use lager_tests::{pid, wait_for};
 use rustix::process::{Signal, kill_process};
@@ -8,14 +8,14 @@ use crate::Scene;
 use crate::browser::Page;
 use crate::played::Stage;
 
-/// Loads the page anew without its script, or over a slow network, and presses STOP as soon as it is
-/// there; the form is answered by a page of its own.
+/// Reloads the page without its script or over a slow network, and presses STOP as soon as it
+/// appears. The form's answer is a page of its own.
 fn stop_early(scene: &mut Scene, page: &mut Page, press: fn(&mut Page)) {
     scene.wait_to_move();
     page.call("Page.navigate", &json!({ "url": scene.url }));
     page.wait_until("document.querySelector('#stop') !== null");
     press(page);
-    page.wait_until("/r1 stands after|both wheels stand/.test(document.body?.textContent)");
+    page.wait_until("/both wheels stand after/.test(document.body?.textContent)");
     scene.assert_stands();
     scene.resume();
 }
@@ -25,7 +25,7 @@ pub(crate) fn stop_works_before_any_script_and_without_a_socket(
     page: &mut Page,
 ) {
     page.call("Network.enable", &json!({}));
-    // A module that does not load, and no script at all.
+    // A script that does not load, and no script at all.
     for (blocked, press) in [
         (
             json!(["*/main.js"]),
@@ -39,7 +39,7 @@ pub(crate) fn stop_works_before_any_script_and_without_a_socket(
         page.key_up("Escape");
     }
     page.call("Network.setBlockedURLs", &json!({ "urls": [] }));
-    // 400 ms and 50 kB/s.
+    // A delay of 400 ms, and 50 kB/s.
     let slow = |page: &mut Page, latency: u32, rate: i32| {
         let conditions = json!({
             "offline": false, "latency": latency, "downloadThroughput": rate, "uploadThroughput": rate,
@@ -56,10 +56,10 @@ pub(crate) fn stop_works_before_any_script_and_without_a_socket(
     scene.wait_to_move();
     page.listen_in();
     page.value("window.WebSocket = class { close() {} }; tapped.close()");
-    page.wait_for("#link", "no connection to the station");
+    page.wait_for("#state", "no connection to the station");
     page.key_down("Escape");
     page.key_up("Escape");
-    page.wait_for("#stop-said", "r1 stands after");
+    page.wait_for("#stop-said", "r1: both wheels stand after");
     scene.assert_stands();
     scene.resume();
 }
@@ -68,7 +68,7 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
     scene: &mut Scene,
     page: &mut Page,
 ) {
-    // The browser has the token by now.
+    // The browser already has the token.
     let (here, _) = scene.url.split_once("/?").expect("a token");
     let here = here.to_owned();
     for at in ["/screen?r77", "/?r77"] {
@@ -83,10 +83,10 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
             page.value("document.body.textContent.includes('AUTONOMOUS')"),
             false
         );
-        // Nobody else was stopped in its place.
+        // No other robot was stopped instead.
         scene.wait_to_move();
     }
-    // The display forgets a stop that somebody has ended.
+    // The display on the robot forgets a stop that a person has ended.
     page.call(
         "Page.navigate",
         &json!({ "url": format!("{here}/screen?r1") }),
@@ -95,7 +95,7 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
     page.key_down("Escape");
     page.key_up("Escape");
     page.wait_for("#stop-said", "both wheels stand");
-    page.wait_for("#doing", "STOPPED");
+    page.wait_for("#state", "STOPPED");
     scene.resume();
     page.wait_until("document.querySelector('#stop-said').textContent === ''");
 }
@@ -133,23 +133,60 @@ pub(crate) fn what_happens_to_the_robot_is_in_the_log_and_survives_the_station(
     let station = pid(scene.up.service("station").expect("it runs"));
     kill_process(station, Signal::KILL).expect("it runs");
     page.wait_for("#entries", "does not reach the station");
-    // What the robot has told the station before is told again, with its time, and once.
+    // The robot repeats earlier reports to a new station, each once and with its time.
     for sentence in [
         "STOPPED: it was ordered",
         "the stop is released",
         "its service logic",
     ] {
-        wait_for(sentence, || {
+        let what = format!("{sentence:?}, no more often than in {before}");
+        wait_for(&what, || {
             let now = page.value(entries);
             let count = |all: &serde_json::Value| {
                 let all = all.as_array().expect("a list").iter();
                 all.filter(|line| line.as_str().is_some_and(|line| line.contains(sentence)))
                     .count()
             };
-            // It keeps the last ones, and no more of them than there were.
+            // It keeps the newest reports, and repeats none.
             (1..=count(&before)).contains(&count(&now)).then_some(())
         });
     }
+}
+
+/// How a state looks: the page's style, the colour behind its sentence, and the text at the robot.
+const LOOK: &str = "(() => { const at = (part) => document.querySelector(part); \
+    return [document.body.dataset.look, getComputedStyle(at('#state')).backgroundColor, \
+      at('#map .chip:not([hidden]) text')?.textContent ?? '-'].join('; '); })()";
+
+#[test]
+fn a_state_has_one_look_in_the_bar_on_the_map_and_on_the_display() {
+    let stage = Stage::new(Some(
+        "size = [2, 2]\nside_length_cm = 50\ndelivery = [0, 0]\n",
+    ));
+    let state = "state hold=none mode=autonomous stopped=0 battery_dv=114 sensor_up=1";
+    let placed = "phase=waiting_for_order x_mm=500 y_mm=500 heading_deg=0 node=1,1 looks=up";
+    let robot = stage.robot("r1", &[&format!("{state} {placed} steering_up=1")]);
+    let mut page = stage.page(&stage.url);
+    let mut screen = stage.browser.page(&stage.url.replacen("/?", "/screen?", 1));
+    let caution = "rgb(255, 208, 66)";
+    let mut looks = |look: &str, colour: &str, words: &str, said: &str| {
+        page.dress("light", 1280, 720, false);
+        screen.dress("light", 1280, 720, false);
+        for (page, words) in [(&mut page, words), (&mut screen, "-")] {
+            page.wait_until(&format!("{LOOK}.startsWith('{look}; {colour}; {words}')"));
+            page.wait_for("#state", said);
+        }
+    };
+    looks("waits", "rgba(0, 0, 0, 0)", "-", "waits for an order");
+    robot.says(&[&format!("{state} {placed} steering_up=0")]);
+    let board = "the steering board is not heard";
+    looks("board", caution, board, "he steering board is not heard");
+    robot.says(&[&format!("{state} phase=lost steering_up=1")]);
+    looks("lost", caution, "place unknown", "oes not know where it is");
+    drop(robot);
+    looks("unheard", caution, "seen ", "r1 is not heard for ");
+    drop((page, screen));
+    stage.end();
 }
 
 #[test]
@@ -157,12 +194,12 @@ fn a_stop_that_cannot_reach_its_robot_says_so() {
     let stage = Stage::new(None);
     let robot = stage.robot("r1", &["state sensor_up=1 steering_up=1 stopped=0"]);
     let mut page = stage.page(&stage.url);
-    page.wait_for("#link", "link ");
+    page.wait_for("#link", " ms");
     drop(robot);
-    page.wait_for("#link", "no link, last heard");
+    page.wait_for("#state", "r1 is not heard");
     page.click("#stop");
     page.wait_for("#stop-said", "NOT SENT: r1 is not heard");
-    // Without the script likewise.
+    // The same without the script.
     page.call("Network.enable", &json!({}));
     page.call("Network.setBlockedURLs", &json!({ "urls": ["*.js"] }));
     page.call("Page.reload", &json!({}));

@@ -1,10 +1,10 @@
-//! Both boards at the far ends of two pseudo terminals, stepped by the test's own thread: what
-//! they send is sent when the test says so, and nothing else wakes the services.
+//! Both boards at the other ends of two pseudo terminals, stepped by the test's own thread: they
+//! send only when the test tells them, and nothing else wakes the services.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-use lager_ports::Clock;
+use lager_home::Clock;
 use lager_rig::{Board, answer_to, wheels_in_the_air};
 use lager_wire::{BoardStatus, Callsign, Payload, ResetCause, SettingStatus, SteerCommand};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -14,11 +14,11 @@ pub(crate) struct Boards {
     sensor: Board,
     steering: Board,
     pub(crate) ports: [PathBuf; 2],
-    /// Every command given, repetitions left out; the last one is in force.
+    /// Every command without its repetitions; the last one is in force.
     pub(crate) commands: Vec<SteerCommand>,
-    /// Packets the bridge has written to the steering board.
+    /// The number of packets that the bridge has written to the steering board.
     pub(crate) written: u64,
-    /// Reports the steering board has sent.
+    /// The number of reports that the steering board has sent.
     pub(crate) reports: u64,
 }
 
@@ -43,7 +43,7 @@ impl Boards {
         self.sensor.spoke_ns = Clock::monotonic_ns();
     }
 
-    /// Waits at most `timeout` for bytes from the bridge and takes them; sends what is due.
+    /// Waits at most `timeout` for bytes from the bridge, reads them, and sends what is due.
     pub(crate) fn step(&mut self, timeout: Duration) {
         let timeout = Timespec::try_from(timeout).expect("a short time");
         let mut fds =
@@ -66,7 +66,7 @@ impl Boards {
         for answer in answers {
             say(&mut self.steering, answer);
         }
-        // No frame: nothing of it goes onto the bus.
+        // Not a frame: nothing of it is published on the bus.
         let _ = self.sensor.speak(STATUS);
         let code = self.commands.last().map_or(0, |command| command.code);
         let reported = self.steering.speak(wheels_in_the_air(code));
@@ -74,12 +74,12 @@ impl Boards {
     }
 }
 
-/// Says something, if the link is up. A line without a listener loses it.
+/// Sends a packet, if the link is up. If nobody has opened the line, the packet is lost.
 fn say(board: &mut Board, payload: Payload) {
     let _ = board.send(payload);
 }
 
-/// A board's counters, all in order.
+/// The counters of a board without errors.
 const STATUS: Payload = Payload::BoardStatus(BoardStatus {
     reset: ResetCause::PowerOn,
     bad_packets: 0,

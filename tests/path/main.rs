@@ -1,8 +1,8 @@
-//! The path from a sensor frame to a steering command, with bridge and logic as processes of
-//! their own under `strace`: what each hop asks of the kernel, what the stamps tell, and what
-//! `latency/path` and `latency/command` count.
+//! Tests of the path from a sensor frame to a steering command. Bridge and logic are processes of
+//! their own under `strace`. The tests check the system calls of each hop, the stamps, and the
+//! counts in `latency/path` and `latency/command`.
 //!
-//! Here the navigator gives a new order for each frame: it takes line frames for old at once, so a
+//! The navigator gives a new order for each frame here: it trusts a line frame for no time, so a
 //! distance frame after a line frame halts the robot, and the next line frame starts it.
 
 mod boards;
@@ -15,11 +15,13 @@ use std::time::{Duration, SystemTime};
 
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
-use lager_ports::{Bus, Shutdown};
+use lager_ports::Bus;
 use lager_rig::process::run_if_asked;
 use lager_rig::{Parent, bus_at};
+use lager_sample::Topic;
 use lager_tests::Domain;
-use lager_topics::{Role, SensorDistance, SensorLine, Topic};
+use lager_topics::{Role, SensorDistance, SensorLine};
+use lager_wake::Shutdown;
 
 use robot::Robot;
 use strace::{Calls, Part};
@@ -27,10 +29,10 @@ use strace::{Calls, Part};
 const BRIDGE: &str = "bridge";
 const LOGIC: &str = "logic";
 
-/// What a part is told: the bus's folder and the serial ports.
-type Told = (PathBuf, [PathBuf; 2]);
+/// The parent's message to a part: the bus's folder and the serial ports.
+type PartSetup = (PathBuf, [PathBuf; 2]);
 
-/// Commands to be seen.
+/// The number of commands that a test waits for.
 const COMMANDS: u64 = 400;
 
 #[test]
@@ -39,22 +41,22 @@ fn part() {
     run_if_asked(&[&[(BRIDGE, bridge), (LOGIC, logic)]]);
 }
 
-/// Runs one service in a thread of its own until the parent has nothing more to say.
+/// Runs one service in a thread of its own until the parent closes the line.
 fn play(
     parent: &mut Parent,
     (name, role): (&str, Role),
     service: impl FnOnce(&Bus, [PathBuf; 2], &Shutdown) + Send,
 ) -> Result<(), Box<dyn Error>> {
-    let (folder, ports): Told = parent.told()?;
+    let (folder, ports): PartSetup = parent.told()?;
     let config = bus_at(folder);
     let shutdown = Shutdown::new();
     std::thread::scope(|scope| {
         std::thread::Builder::new()
             .name(name.to_owned())
             .spawn_scoped(scope, || {
-                let place = config.place().expect("a folder");
-                // As `lager bridge` does: by its lock others know that it is up.
-                let _lock = place.lock(&config.robot, role).expect("its lock");
+                let place = config.home().expect("a folder");
+                // As in `lager bridge`: the lock shows others that the service is up.
+                let _lock = place.lock(&config.unit, role).expect("its lock");
                 let bus = Bus::open(&config, role).expect("the bus opens");
                 service(&bus, ports, &shutdown);
             })
@@ -89,9 +91,9 @@ fn logic(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     })
 }
 
-/// That something was done at most so often. A ring can end two sleeps: the ringer adds to the
-/// word, the sleeper sees that on its way to sleep and comes back, and the ringer's wake-up call
-/// meets the next sleep. That is rare, so one call in fifty is let pass.
+/// Asserts that something was done at most `most` times. One call in fifty more is allowed, since
+/// rarely a ring ends two sleeps: the ringer adds to the word, the sleeper sees that on its way to
+/// sleep and returns, and the ringer's wake-up call ends the next sleep.
 #[track_caller]
 fn at_most(limit: u64, actual: u64, what: &str, calls: &Calls) {
     assert!(
@@ -130,10 +132,10 @@ fn a_frame_costs_its_read_its_write_and_one_ring_and_one_sleep_a_hop() {
         calls
     };
     println!("{frames} frames, {orders} orders, {written} packets, {states} states");
-    // Now and then a report or an idle moment is faster than a frame and takes its place.
+    // Sometimes a report or an idle moment comes before a frame and halts the robot instead.
     assert!(frames.min(orders).min(written) + reports >= COMMANDS);
 
-    // Reading the port, asleep until something comes; ringing logic.
+    // The reader's calls: sleep on the port and read it; ring logic.
     let reader = calls(&robot.bridge, "sensor-port");
     at_most(0, reader.polls, "waits for the sensor port", &reader);
     at_most(frames, reader.reads, "reads of the sensor port", &reader);
@@ -141,7 +143,7 @@ fn a_frame_costs_its_read_its_write_and_one_ring_and_one_sleep_a_hop() {
     assert_eq!((reader.sleeps, reader.writes), (0, 0), "{reader:?}");
     assert!(reader.reads + 2 >= frames, "strace has seen every read");
 
-    // Sleeping for a ring, ringing the bridge.
+    // Logic's calls: sleep until it is rung; ring the bridge.
     let logic = calls(&robot.logic, "logic-loop");
     at_most(frames + states, logic.sleeps, "sleeps of logic", &logic);
     at_most(orders, logic.wakes, "rings for an order", &logic);
@@ -151,7 +153,7 @@ fn a_frame_costs_its_read_its_write_and_one_ring_and_one_sleep_a_hop() {
         "{logic:?}"
     );
 
-    // Sleeping for a ring, writing the port; ringing logic for reports alone.
+    // The bridge's calls: sleep until it is rung; write to the port; ring logic only for reports.
     let bridge = calls(&robot.bridge, "bridge-loop");
     at_most(
         orders + reports,
@@ -165,8 +167,8 @@ fn a_frame_costs_its_read_its_write_and_one_ring_and_one_sleep_a_hop() {
     assert_eq!((bridge.polls, bridge.reads), (0, 0), "{bridge:?}");
     assert!(bridge.writes + 2 >= written, "strace has seen every write");
 
-    // After a tenth of a second without a report a read comes back with nothing, and a poll asks
-    // why. A report may come just then, so the poll need not time out.
+    // After 100 ms without a report, a read returns nothing, and then a poll asks for the reason. A
+    // report may come just then, so the poll need not time out.
     let reports_reader = calls(&robot.bridge, "steering-port");
     let asked = reports_reader.polls + reports_reader.timeouts;
     let tenths = to.duration_since(from).expect("time goes on").as_millis() / 100;
@@ -200,7 +202,7 @@ fn every_frame_counts_and_each_command_that_one_has_caused() {
     let frames = robot.seen.samples().frames;
     let before = robot.seen.last_path;
     robot.frames(COMMANDS);
-    // Without frames logic halts by the clock and renews its order; a report now and then.
+    // Without frames, logic halts by its clock and renews that order; reports come now and then.
     let sent = robot.seen.sent;
     robot.step_until("the order has been renewed for a while", |robot| {
         robot.seen.sent >= sent + 20
@@ -215,7 +217,7 @@ fn every_frame_counts_and_each_command_that_one_has_caused() {
         .iter()
         .filter(|stamp| [SensorLine::ID, SensorDistance::ID].contains(&stamp.cause_topic))
         .collect();
-    // A report that comes at the very moment of a distance frame halts the robot in its place.
+    // A report that comes at the same moment as a distance frame halts the robot instead.
     assert!(caused.len() as u64 + robot.boards.reports >= COMMANDS);
     for stamp in &caused {
         let way = [
@@ -228,12 +230,11 @@ fn every_frame_counts_and_each_command_that_one_has_caused() {
         let within = |[sent, read]: &[u64; 2]| *sent <= way[0] && way[3] <= *read;
         assert!(robot.spans.iter().any(within), "at no frame: {stamp:?}");
     }
-    // An order that halts a robot that sees no frames says nothing of one, nor do its renewals.
+    // If logic halts because no frame comes, neither the order nor its renewals name a frame.
     assert!(robot.seen.sent > caused.len() as u64);
     assert!(robot.seen.orders.len() > caused.len());
 
-    // A report that comes right after a line frame can replace the frame's order before it is
-    // written.
+    // A report right after a line frame can replace the frame's order before the bridge writes it.
     let command = robot.seen.last_command;
     let counted = command.total.count;
     let replaced = caused.len() as u64 - counted;

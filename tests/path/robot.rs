@@ -1,37 +1,39 @@
-//! A robot whose bridge and logic are processes of their own, driven frame by frame, and what an
-//! observer sees of it on the bus.
+//! A robot whose bridge and logic are processes of their own. The test drives it frame by frame,
+//! and an observer counts its samples on the bus.
 
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, Clock, Subscriber};
+use lager_home::Clock;
+use lager_ports::{Bus, Subscriber};
 use lager_rig::Outset;
+use lager_sample::Stamp;
 use lager_tests::{Domain, WATCHDOG};
 use lager_topics::{
     CommandLatency, LatencyCommand, LatencyPath, LinkHealth, PathLatency, Role, SensorDistance,
-    SensorLine, Stamp, SteeringCommand, SteeringState,
+    SensorLine, SteeringCommand, SteeringState,
 };
 use lager_wire::{Centimetres, Command, LineState, Payload, SteerCommand, WheelCommand};
 
 use crate::boards::Boards;
 use crate::strace::Part;
-use crate::{BRIDGE, LOGIC, Told};
+use crate::{BRIDGE, LOGIC, PartSetup};
 
-/// Between a command and the next frame: everybody sleeps again.
+/// The pause from a command to the next frame, in which all threads fall asleep again.
 const PAUSE: Duration = Duration::from_millis(3);
 
-/// After this a frame is taken for one that changed nothing.
+/// If no command has come after this time, the frame has changed nothing.
 const UNANSWERED: Duration = Duration::from_secs(1);
 
-/// A robot that looks for its product on the first edge, with its wheels in the air.
+/// A robot that drives towards its product on the first edge, with its wheels in the air.
 pub(crate) struct Robot {
-    // The services end before their boards, and everything before the bus.
+    // The services end before their boards, and the bus is dropped last.
     pub(crate) bridge: Part,
     pub(crate) logic: Part,
     pub(crate) boards: Boards,
     pub(crate) seen: Seen,
     operator: Outset,
     _bus: Bus,
-    /// From before each answered frame was sent until after its command was read, in ns.
+    /// For each answered frame, the times before it was sent and after its command was read, in ns.
     pub(crate) spans: Vec<[u64; 2]>,
 }
 
@@ -44,28 +46,28 @@ pub(crate) struct Seen {
     path: Subscriber<LatencyPath>,
     command: Subscriber<LatencyCommand>,
     health: Subscriber<LinkHealth>,
-    /// Orders that ended because nobody renewed them in time: the machine was too busy.
+    /// The number of orders that ended because the busy machine did not renew them in time.
     lapsed: u32,
-    /// Stamps of the orders with a number of their own, in turn.
+    /// The stamp of each order with a new number, in turn.
     pub(crate) orders: Vec<Stamp>,
     last_id: u32,
-    /// Samples on `steering/command`, renewals included.
+    /// The number of samples on `steering/command`, with renewals.
     pub(crate) sent: u64,
-    /// What `latency/path` and `latency/command` said last.
+    /// The last samples of `latency/path` and `latency/command`.
     pub(crate) last_path: PathLatency,
     pub(crate) last_command: CommandLatency,
 }
 
-/// Samples published.
+/// The numbers of published samples.
 #[derive(Clone, Copy)]
 pub(crate) struct Samples {
     /// On `sensor/line` and `sensor/distance`.
     pub(crate) frames: u64,
-    /// On `steering/command`, renewals included.
+    /// On `steering/command`, with renewals.
     pub(crate) orders: u64,
     /// On `steering/state`.
     pub(crate) states: u64,
-    /// Orders that lapsed; the end of each is told on `steering/state`.
+    /// The number of orders that nobody renewed in time; `steering/state` reports the end of each.
     pub(crate) lapsed: u64,
 }
 
@@ -110,17 +112,17 @@ impl Seen {
         }
     }
 
-    /// How often both latencies were told.
+    /// How many times both latencies were published.
     pub(crate) fn told(&self) -> u64 {
         self.path.received().min(self.command.received())
     }
 
-    /// Orders that came and went between two looks.
+    /// The number of orders that came and went between two looks.
     pub(crate) fn missed(&self) -> u64 {
         self.commands.lost()
     }
 
-    /// Samples so far.
+    /// The numbers of samples so far.
     pub(crate) fn samples(&self) -> Samples {
         Samples {
             frames: self.line.received()
@@ -138,7 +140,7 @@ impl Robot {
     pub(crate) fn start(domain: &Domain, traced: bool) -> Self {
         let boards = Boards::new();
         let bus = domain.bus("r1", 1.0);
-        let told: Told = (domain.bus_folder().to_owned(), boards.ports.clone());
+        let told: PartSetup = (domain.bus_folder().to_owned(), boards.ports.clone());
         let part = |name: &str| {
             let log = traced.then(|| domain.folder().join(format!("{name}.strace")));
             Part::start(log, name, &told)
@@ -157,20 +159,20 @@ impl Robot {
         robot
     }
 
-    /// Brings both boards up, and waits until logic looks for the product.
+    /// Brings both boards up, and waits until logic drives towards the product.
     fn set_out(&mut self) {
         self.step_until("the robot is on its way", |robot| {
             robot.operator.goes_on().expect("an operator")
         });
-        // Until a board has reported, the bridge tells in its place what it was told.
+        // Until the board has reported, the bridge publishes its own last command instead.
         self.step_until("the board has reported", |robot| {
             robot.seen.state.received() > 1
         });
-        // The first sample of a topic is the one that connects its writer with the observer.
+        // By its first sample a publisher and the observer find each other.
         self.settle();
     }
 
-    /// Waits until all that was counted so far is told.
+    /// Waits until everything counted so far was published.
     pub(crate) fn settle(&mut self) {
         let told = self.seen.told();
         self.step_until("both latencies are told twice", |robot| {
@@ -187,12 +189,12 @@ impl Robot {
         }
     }
 
-    /// Sends a frame that makes logic change its mind and waits for the command; whether it came.
+    /// Sends a frame that changes logic's decision; returns whether the command came.
     fn frame(&mut self) -> bool {
         let follows = |command: &SteerCommand| {
             command.code == Command::Wheel(WheelCommand::ActiveForward).code()
         };
-        // An idle moment or a report halts the robot as well.
+        // A moment without frames, or a report, halts the robot as well.
         let given = self.boards.commands.len();
         let is_following = self.boards.commands.last().is_some_and(follows);
         let sent_ns = Clock::monotonic_ns();
@@ -215,7 +217,7 @@ impl Robot {
         answered
     }
 
-    /// Frames until so many commands have come.
+    /// Sends frames until `commands` commands have come.
     pub(crate) fn frames(&mut self, commands: u64) {
         let give_up = Instant::now() + WATCHDOG;
         let mut seen = 0;

@@ -1,7 +1,7 @@
-//! The system calls of a service's threads, as `strace` saw them.
+//! The system calls of a service's threads, from the log of `strace`.
 //!
-//! Counted are the calls that begin in a span of wall-clock time, by what they do for the path;
-//! everything else is kept word for word, so that a test can say what is too much.
+//! A test counts the calls that begin in a span of wall-clock time, by their task on the path. All
+//! other calls are kept as text, so that a test can name those that are too many.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,36 +12,35 @@ use std::time::SystemTime;
 use lager_rig::Process;
 use lager_tests::children;
 
-use crate::Told;
+use crate::PartSetup;
 
-/// What one thread asked of the kernel.
+/// The system calls of one thread.
 #[derive(Debug, Default)]
 pub(crate) struct Calls {
     /// Sleeps on a futex that did not end by their time-out.
     pub(crate) sleeps: u64,
-    /// Sleepers woken.
+    /// The number of woken sleepers.
     pub(crate) wakes: u64,
     /// Waits for a port that did not end by their time-out.
     pub(crate) polls: u64,
     pub(crate) reads: u64,
     pub(crate) writes: u64,
-    /// Waits of both kinds that ended by their time-out.
+    /// Waits on a futex or a port that ended by their time-out.
     pub(crate) timeouts: u64,
-    /// Anything else.
+    /// All other calls.
     pub(crate) others: Vec<String>,
 }
 
 /// A service in a process of its own.
 pub(crate) struct Part {
     process: Process,
-    /// Where `strace` writes, for a part that is traced.
+    /// The log of `strace`, if the part is traced.
     log: Option<PathBuf>,
 }
 
 impl Part {
-    /// Starts the service `name` under `strace` if there is a `log` to write to, and tells it what
-    /// it is to know.
-    pub(crate) fn start(log: Option<PathBuf>, name: &str, told: &Told) -> Self {
+    /// Starts the service `name`, under `strace` if there is a `log`, and sends it its message.
+    pub(crate) fn start(log: Option<PathBuf>, name: &str, told: &PartSetup) -> Self {
         let process = match &log {
             None => Process::start_in_test(name, "part"),
             Some(log) => {
@@ -57,7 +56,7 @@ impl Part {
         Self { process, log }
     }
 
-    /// The threads of the traced part by name.
+    /// The names of the traced part's threads, with their ids.
     pub(crate) fn threads(&self) -> BTreeMap<String, String> {
         let Some(process) = children(self.process.pid()).first().copied() else {
             return BTreeMap::new();
@@ -79,7 +78,7 @@ impl Part {
         assert!(self.process.end().success());
     }
 
-    /// What the thread asked of the kernel from `from` to `to`.
+    /// The system calls of the thread from `from` to `to`.
     pub(crate) fn calls(&self, thread: &str, from: SystemTime, to: SystemTime) -> Calls {
         let seconds = |time: SystemTime| {
             time.duration_since(SystemTime::UNIX_EPOCH)
@@ -91,7 +90,7 @@ impl Part {
         let log = fs::read_to_string(log).expect("strace's log");
         let mut calls = Calls::default();
         for line in log.lines() {
-            // thread, time, call; strace pads the thread.
+            // The fields are thread, time and call; strace pads the thread with spaces.
             let Some((id, rest)) = line.split_once(' ') else {
                 continue;
             };
@@ -108,8 +107,8 @@ impl Part {
 }
 
 impl Calls {
-    /// Takes one line. A call that other threads' lines interrupt has two: the first one is the
-    /// call, the second one tells how it ended.
+    /// Counts one line of the log. A call that another thread's line interrupts has two lines: the
+    /// first has the call, the second its result.
     fn add(&mut self, call: &str) {
         let waits_for_port = call.contains("poll");
         if !call.starts_with("<...") {

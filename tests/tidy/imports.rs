@@ -1,16 +1,16 @@
-//! Which files of a crate import each other, read from their source: enough of Rust to find `use`
-//! declarations and paths, and nothing more.
+//! Finds the files of a crate that import each other in a circle. It reads their source, and knows
+//! just enough of Rust to find `use` declarations and paths.
 //!
-//! A path is followed through `use` declarations that only pass a name on, to the file that has
-//! the thing. What a macro writes and what a method call reaches is not seen.
+//! A path is followed through `use` declarations that only re-export a name, to the file that
+//! defines it. Code written by a macro and code reached by a method call are not seen.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// A module's place in its crate; the root's is empty.
+/// The path of a module in its crate; the root's is empty.
 pub(crate) type Module = Vec<String>;
 
-/// The modules of one crate that have a file of their own, and what they import of each other.
+/// The modules of one crate that have files of their own, and their imports of each other.
 pub(crate) struct Crate {
     files: BTreeMap<Module, PathBuf>,
     paths: BTreeMap<Module, Vec<Named>>,
@@ -18,10 +18,10 @@ pub(crate) struct Crate {
 
 /// A path that a file names.
 struct Named {
-    /// The modules within the file around the place where it stands.
+    /// The modules inside the file that contain the path.
     within: Vec<String>,
     segments: Vec<String>,
-    /// It stands in a `use` at the top of the file.
+    /// The path is in a `use` at the top of the file.
     is_passed_on: bool,
 }
 
@@ -42,10 +42,10 @@ impl Crate {
         Self { files, paths }
     }
 
-    /// The modules that import each other in a circle, as the names of those side by side.
+    /// The circles of modules that import each other, by the names of the modules of one folder.
     ///
-    /// What lies below a module belongs to it: what passes between a module and its own parts is
-    /// its own affair, and what a part imports of elsewhere the module imports.
+    /// A module includes everything below it. Imports between a module and its own parts do not
+    /// count, and an import of a part counts as one of the module.
     pub(crate) fn circles(&self) -> Vec<String> {
         let mut side_by_side: BTreeMap<&[String], BTreeMap<&str, BTreeSet<&str>>> = BTreeMap::new();
         let imports = self.imports();
@@ -74,7 +74,7 @@ impl Crate {
         circles
     }
 
-    /// Every pair of modules of which the first names something of the second.
+    /// Every pair of modules of which the first names an item of the second.
     fn imports(&self) -> BTreeSet<(Module, Module)> {
         let mut passed_on: BTreeMap<(Module, String), (Module, Vec<String>)> = BTreeMap::new();
         for (module, named) in self.all() {
@@ -92,7 +92,7 @@ impl Crate {
             let Some((mut to, mut rest)) = self.resolve(module, named) else {
                 continue;
             };
-            // As many steps as no honest path takes.
+            // More steps than any real path has.
             for _ in 0..8 {
                 let Some(name) = rest.first() else {
                     break;
@@ -115,7 +115,7 @@ impl Crate {
         self.paths.iter().flat_map(each)
     }
 
-    /// The module a path leads to and what it names there; `None` for what is not this crate's.
+    /// The module to which a path leads, and the rest of the path; `None` if that is another crate.
     fn resolve(&self, module: &Module, named: &Named) -> Option<(Module, Vec<String>)> {
         let mut at: Module = [module.clone(), named.within.clone()].concat();
         let mut rest = named.segments.as_slice();
@@ -147,7 +147,7 @@ impl Crate {
             }
             (at, rest) = (below, behind);
         }
-        // A module within a file belongs to the file.
+        // A module inside a file belongs to the file.
         while !self.files.contains_key(&at) {
             at.pop();
         }
@@ -155,7 +155,7 @@ impl Crate {
     }
 }
 
-/// Whether `from` uses `to`, in however many steps.
+/// Whether `from` uses `to`, directly or through others.
 fn leads(uses: &BTreeMap<&str, BTreeSet<&str>>, from: &str, to: &str) -> bool {
     let mut seen = BTreeSet::new();
     let mut open: Vec<&str> = uses.get(from).into_iter().flatten().copied().collect();
@@ -170,7 +170,7 @@ fn leads(uses: &BTreeMap<&str, BTreeSet<&str>>, from: &str, to: &str) -> bool {
     false
 }
 
-/// The module that a file below `src` is.
+/// The module of a file below `src`.
 fn module(file: &Path) -> Module {
     let mut parts: Module = file
         .with_extension("")
@@ -184,7 +184,7 @@ fn module(file: &Path) -> Module {
     parts
 }
 
-/// The words and signs of a source; comments, strings and characters are left out.
+/// The words and signs of a source, without comments, strings and characters.
 fn tokens(text: &str) -> Vec<String> {
     let mut tokens = Vec::new();
     let mut rest = text;
@@ -214,7 +214,7 @@ fn tokens(text: &str) -> Vec<String> {
     tokens
 }
 
-/// How long the string or character is with which `text` begins.
+/// The length of the string or character literal with which `text` begins.
 fn string(text: &str) -> Option<usize> {
     let body = text.strip_prefix('b').unwrap_or(text);
     let before = text.len() - body.len();
@@ -232,7 +232,7 @@ fn string(text: &str) -> Option<usize> {
     for (at, c) in body.char_indices().skip(1) {
         length += 1;
         match c {
-            // A lifetime is no character.
+            // A lifetime is not a character literal.
             _ if quote == '\''
                 && length > 1
                 && !escaped
@@ -250,7 +250,7 @@ fn string(text: &str) -> Option<usize> {
     None
 }
 
-/// The paths that a source names.
+/// The paths in a source.
 fn named(tokens: &[String]) -> Vec<Named> {
     let mut found = Vec::new();
     let mut within: Vec<(String, usize)> = Vec::new();
@@ -275,7 +275,7 @@ fn named(tokens: &[String]) -> Vec<Named> {
                 within.retain(|(_, outside)| *outside < depth);
                 at += 1;
             }
-            // Not what a returned `impl` captures, as in `use<>`.
+            // Not `use<>`, which lists what a returned `impl` captures.
             "use" if token(at + 1) != "<" => {
                 let mut uses = Vec::new();
                 at = tree(tokens, at + 1, &[], &mut uses);
@@ -304,7 +304,7 @@ fn named(tokens: &[String]) -> Vec<Named> {
     found
 }
 
-/// Reads one tree of a `use` from `at` on; where it ends.
+/// Reads one tree of a `use` from `at` on; returns the position of its end.
 fn tree(
     tokens: &[String],
     mut at: usize,
@@ -325,7 +325,7 @@ fn tree(
             }
             Some("as") => at += 2,
             Some("," | "}" | ";") | None => {
-                // `self` in braces is the module before it.
+                // `self` in braces means the module before them.
                 if path.len() > 1 && path.last().is_some_and(|last| last == "self") {
                     path.pop();
                 }
@@ -383,7 +383,7 @@ fn a_circle_is_found_through_what_is_passed_on_and_through_parts() {
         };
         one.circles()
     };
-    // A module and its part, and the root that passes on what both have.
+    // A module with its part, and a root that re-exports items of both: no circle.
     let honest = [
         ("lib.rs", "mod a; mod b; pub use b::B;"),
         ("a/mod.rs", "mod c; use c::C; use crate::B;"),

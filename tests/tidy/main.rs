@@ -1,131 +1,19 @@
-//! The rules of the house, held by reading the workspace itself: which crate may use which, how
-//! crates are named, how deep folders go, and that versions and lints live in one place.
+//! Tests of the workspace's own rules, by reading it: which crate may use which, the names of
+//! crates, the depth of folders, and that versions and lints are declared in one place.
 
+mod floors;
 mod imports;
+mod requirements;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use floors::{MARKER, MAY_USE, OPEN_ICEORYX2};
 use serde_json::Value;
 
-/// The floor table: a crate, and the crates of the house that it may use. A crate that is not
-/// listed here is refused, so a new one has to find its floor first.
-///
-/// Services meet on the bus and never import each other; only `lager`, `benches` and `tests` see
-/// several of them.
-const MAY_USE: &[(&str, &[&str])] = &[
-    // floor 0
-    ("lager-wire", &[]),
-    // An operator's commands and their codes are the wire's.
-    ("lager-lines", &["lager-wire"]),
-    // It knows nothing of what is asked.
-    ("lager-door", &[]),
-    ("lager-ax12", &[]),
-    ("lager-exde", &[]),
-    ("lager-plant", &["lager-ax12"]),
-    ("lager-pty", &[]),
-    // floor 1
-    ("lager-control", &["lager-wire", "lager-ax12", "lager-exde"]),
-    ("lager-topics", &["lager-wire"]),
-    // floor 2
-    ("lager-ports", &["lager-topics"]),
-    // What a message is: a stamp and a payload, as the table describes them.
-    ("lager-journal", &["lager-topics"]),
-    // floor 3
-    (
-        "lager-bridge",
-        &["lager-ports", "lager-topics", "lager-wire"],
-    ),
-    // The navigator speaks the wire's line states and command codes, which topics carry.
-    (
-        "lager-logic",
-        &["lager-ports", "lager-topics", "lager-wire"],
-    ),
-    ("lager-monitor", &["lager-ports", "lager-topics"]),
-    (
-        "lager-gateway",
-        &["lager-door", "lager-journal", "lager-ports", "lager-topics"],
-    ),
-    (
-        "lager-recorder",
-        &["lager-journal", "lager-ports", "lager-topics"],
-    ),
-    // The robot's side of the lines, between the network and the bus.
-    (
-        "lager-comm",
-        &["lager-lines", "lager-ports", "lager-topics", "lager-wire"],
-    ),
-    // The external computer is on no bus. It shares the warehouse's file with the simulated world.
-    (
-        "lager-station",
-        &["lager-lines", "lager-plant", "lager-wire"],
-    ),
-    // It shows the station in a browser, so it is on no bus either.
-    (
-        "lager-panel",
-        &["lager-door", "lager-lines", "lager-station"],
-    ),
-    (
-        "lager-simulator",
-        &[
-            "lager-ports",
-            "lager-topics",
-            "lager-control",
-            "lager-wire",
-            "lager-ax12",
-            "lager-exde",
-            "lager-plant",
-            "lager-pty",
-        ],
-    ),
-    // What tests and benches stand on.
-    ("lager-rig", &["lager-ports", "lager-topics", "lager-wire"]),
-    // floor 4
-    (
-        "lager-benches",
-        &[
-            "lager-rig",
-            "lager-wire",
-            "lager-topics",
-            "lager-ports",
-            "lager-bridge",
-            "lager-logic",
-        ],
-    ),
-    // floor 5
-    (
-        "lager",
-        &[
-            "lager-lines",
-            "lager-comm",
-            "lager-station",
-            "lager-panel",
-            "lager-ports",
-            "lager-topics",
-            "lager-wire",
-            "lager-plant",
-            "lager-bridge",
-            "lager-logic",
-            "lager-gateway",
-            "lager-monitor",
-            "lager-recorder",
-            "lager-simulator",
-            "lager-benches",
-        ],
-    ),
-    ("lager-tests", &["*"]),
-];
-
-/// The crates that may name iceoryx2's ports and services: the one that opens the robot's bus, and
-/// the one that measures it beside bare iceoryx2.
-const OPEN_ICEORYX2: &[&str] = &["lager-ports", "lager-benches"];
-
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("tests is below the root")
-        .to_owned()
+    lager_tests::in_tree("")
 }
 
 fn metadata() -> Value {
@@ -170,7 +58,7 @@ fn folder(package: &Value) -> PathBuf {
         .to_owned()
 }
 
-/// Every Rust file that git would see below `folder`.
+/// Every Rust file below `folder` that git would see.
 fn rust_files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![root().join(folder)];
@@ -200,8 +88,11 @@ fn every_crate_keeps_to_its_floor() {
         };
         for dependency in package["dependencies"].as_array().expect("dependencies") {
             let used = dependency["name"].as_str().expect("a name");
-            // What only a crate's own tests use does not reach those who use the crate.
+            // What only a crate's tests use does not reach the crate's users.
             let for_tests = dependency["kind"].as_str() == Some("dev");
+            // Cargo builds the program only with `lager`'s own tests; others would start an old
+            // one.
+            let for_tests = for_tests && (used != "lager-tests" || name(package) == "lager");
             let permitted = allowed.contains(&"*") || allowed.contains(&used);
             if house.contains(used) && !permitted && !for_tests {
                 complaints.push(format!("{} may not use {used}", name(package)));
@@ -217,10 +108,48 @@ fn every_crate_keeps_to_its_floor() {
 }
 
 #[test]
+fn the_program_that_tests_start_is_the_one_that_cargo_built_with_them() {
+    assert_eq!(lager_tests::lager(), Path::new(env!("CARGO_BIN_EXE_lager")));
+}
+
+#[test]
+fn the_map_has_every_crate_below_those_that_it_uses() {
+    let map = document("ARCHITECTURE.md");
+    let rows = map.lines().filter_map(|line| line.strip_prefix("| "));
+    let order: Vec<&str> = rows
+        .filter_map(|row| row.split('|').nth(1))
+        .flat_map(|folders| folders.split('`').skip(1).step_by(2))
+        .collect();
+    let metadata = metadata();
+    let house: BTreeMap<&str, String> = packages(&metadata)
+        .into_iter()
+        .map(|package| (name(package), folder(package).display().to_string()))
+        .collect();
+    let at = |folder: &str| order.iter().position(|row| *row == folder);
+    let mut complaints = Vec::new();
+    for package in packages(&metadata) {
+        let folder = &house[name(package)];
+        let Some(row) = at(folder) else {
+            complaints.push(format!("ARCHITECTURE.md's table has no row for {folder}"));
+            continue;
+        };
+        for dependency in package["dependencies"].as_array().expect("dependencies") {
+            let used = house.get(dependency["name"].as_str().expect("a name"));
+            let for_tests = dependency["kind"].as_str() == Some("dev");
+            if let Some(used) = used.filter(|_| !for_tests)
+                && at(used).is_some_and(|below| below > row)
+            {
+                complaints.push(format!("{folder} uses {used}, which stands below it"));
+            }
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+#[test]
 fn only_ports_and_its_baseline_open_iceoryx2() {
     for package in packages(&metadata()) {
-        // Topics names the marker trait and the containers of shared memory, nothing that opens.
-        if OPEN_ICEORYX2.contains(&name(package)) || name(package) == "lager-topics" {
+        if OPEN_ICEORYX2.contains(&name(package)) {
             continue;
         }
         let uses = package["dependencies"]
@@ -231,20 +160,9 @@ fn only_ports_and_its_baseline_open_iceoryx2() {
                 dependency["kind"].as_str() != Some("dev")
                     && dependency["name"]
                         .as_str()
-                        .is_some_and(|name| name.starts_with("iceoryx2"))
+                        .is_some_and(|name| name.starts_with("iceoryx2") && name != MARKER)
             });
         assert!(!uses, "{} uses iceoryx2 past lager-ports", name(package));
-    }
-    for file in rust_files(Path::new("bus/topics/src")) {
-        let text = std::fs::read_to_string(&file).expect("a readable file");
-        for port in [
-            "NodeBuilder",
-            "PortFactory",
-            "iceoryx2::port",
-            "ServiceName",
-        ] {
-            assert!(!text.contains(port), "{} names {port}", file.display());
-        }
     }
 }
 
@@ -277,7 +195,7 @@ fn crates_are_named_after_their_folders_two_levels_deep() {
 fn no_modules_import_each_other_in_a_circle() {
     let mut found = BTreeSet::new();
     let mut crates: Vec<PathBuf> = packages(&metadata()).into_iter().map(folder).collect();
-    // Workspaces of their own.
+    // These are workspaces of their own.
     crates.extend(["firmware/avr", "firmware/emulator"].map(PathBuf::from));
     for folder in &crates {
         let source = root().join(folder).join("src");
@@ -304,7 +222,7 @@ fn versions_and_lints_live_in_the_workspace() {
             "{manifest} does not take the workspace's lints"
         );
         for line in text.lines() {
-            let versioned = line.contains("version = \"") || line.contains("path = \"../");
+            let versioned = line.contains("version = \"") || line.contains("{ path = ");
             assert!(
                 !versioned,
                 "{manifest}: `{line}`: name versions and paths in [workspace.dependencies]"
@@ -314,7 +232,7 @@ fn versions_and_lints_live_in_the_workspace() {
 }
 
 #[test]
-fn every_file_opens_with_what_it_is() {
+fn every_file_opens_with_what_it_is_and_is_short() {
     for folder in ["bus", "services", "firmware", "benches", "tests"] {
         for file in rust_files(Path::new(folder)) {
             let text = std::fs::read_to_string(&file).expect("a readable file");
@@ -327,35 +245,73 @@ fn every_file_opens_with_what_it_is() {
                 let own = file.ends_with("tests/tidy/main.rs");
                 assert!(own || !text.contains(mark), "{}: {mark}", file.display());
             }
+            let lines = text.lines().count();
+            assert!(lines <= 600, "{} has {lines} lines", file.display());
         }
     }
+}
+
+/// The documents for people, as paths from the root.
+const DOCUMENTS: &[&str] = &[
+    "README.md",
+    "ARCHITECTURE.md",
+    "bus/README.md",
+    "services/gateway/README.md",
+    "services/lager/README.md",
+    "services/recorder/README.md",
+    "services/station/README.md",
+    "firmware/README.md",
+    "firmware/avr/README.md",
+    "firmware/emulator/README.md",
+    "benches/README.md",
+    "benches/RESULTS.md",
+];
+
+fn document(name: &str) -> String {
+    std::fs::read_to_string(root().join(name)).expect("a document")
 }
 
 #[test]
 fn the_documents_are_finished_and_name_files_that_exist() {
-    for document in ["README.md", "ARCHITECTURE.md"] {
-        let text = std::fs::read_to_string(root().join(document)).expect("a document");
+    for name in DOCUMENTS {
+        let text = document(name);
         for mark in ["TODO", "FIXME", "UP_SAMPLE", "MEASURED", "TBD"] {
-            assert!(!text.contains(mark), "{document}: {mark}");
+            assert!(!text.contains(mark), "{name}: {mark}");
         }
-        // Whatever stands in backticks and looks like a path of ours is one.
+        // Text in backticks that looks like a path of this project must be one.
         for quoted in text.split('`').skip(1).step_by(2) {
             let ours = ["bus/", "services/", "firmware/", "tests/", "benches/"]
                 .iter()
                 .any(|top| quoted.starts_with(top));
-            if ours && !quoted.contains(char::is_whitespace) {
-                assert!(
-                    root().join(quoted).exists(),
-                    "{document}: there is no {quoted}"
-                );
-            }
+            // A build has to make it first.
+            let is_made = quoted.contains("/target/");
+            let is_path = ours && !is_made && !quoted.contains(char::is_whitespace);
+            let (path, _test) = quoted.split_once("::").unwrap_or((quoted, ""));
+            assert!(
+                !is_path || root().join(path).exists(),
+                "{name}: there is no {quoted}"
+            );
+        }
+        // A link starts in the document's own folder.
+        let folder = root().join(name).parent().expect("a folder").to_owned();
+        for link in text.split("](").skip(1) {
+            let (link, _) = link.split_once(')').expect("the link's end");
+            let elsewhere = link.starts_with("http") || folder.join(link).exists();
+            assert!(elsewhere, "{name}: there is no {link}");
         }
     }
 }
 
 #[test]
-fn the_readme_shows_lines_of_the_examples() {
-    let readme = std::fs::read_to_string(root().join("README.md")).expect("the README");
+fn the_readme_and_the_map_are_short() {
+    for (name, most) in [("README.md", 220), ("ARCHITECTURE.md", 150)] {
+        let lines = document(name).lines().count();
+        assert!(lines <= most, "{name} has {lines} lines, more than {most}");
+    }
+}
+
+#[test]
+fn the_readmes_show_lines_of_the_examples() {
     let examples: BTreeSet<String> = rust_files(&root().join("bus/ports/examples"))
         .iter()
         .flat_map(|file| {
@@ -364,22 +320,26 @@ fn the_readme_shows_lines_of_the_examples() {
             lines
         })
         .collect();
-    let mut shown = 0;
-    for block in readme.split("```rust\n").skip(1) {
-        let (block, _) = block.split_once("```").expect("the block's end");
-        for line in block.lines().map(str::trim) {
-            let says = line.starts_with("//") && !line.starts_with("///");
-            assert!(says || examples.contains(line), "README shows {line:?}");
-            shown += 1;
+    for name in ["README.md", "bus/README.md"] {
+        let mut shown = 0;
+        for block in document(name).split("```rust\n").skip(1) {
+            let (block, _) = block.split_once("```").expect("the block's end");
+            for line in block.lines().map(str::trim) {
+                let says = line.starts_with("//") && !line.starts_with("///");
+                assert!(says || examples.contains(line), "{name} shows {line:?}");
+                shown += 1;
+            }
         }
+        assert!(shown > 0, "{name} shows no example");
     }
-    assert!(shown > 0, "the README shows no example");
 }
 
 #[test]
 fn the_lower_floors_forbid_unsafe_code() {
     for folder in [
         "bus/wire",
+        "bus/floor",
+        "bus/orders",
         "bus/lines",
         "bus/journal",
         "firmware/control",

@@ -1,7 +1,6 @@
-//! `lager topic` and `lager top` on topics of one's own and beside a robot: what is measured, what
-//! may be published, and that a topic that loses samples is seen at once.
+//! Tests of `lager topic` and `lager top` on a user's own topics and beside a robot: what they
+//! measure, what they may publish, and that they show at once a topic that loses samples.
 
-mod listened;
 mod screen;
 
 use std::io::Write;
@@ -9,31 +8,32 @@ use std::process::{Output, Stdio};
 use std::time::Duration;
 
 use lager_ports::{Bus, Cause, Publisher, Subscriber};
+use lager_sample::{Qos, Stamp, Topic, payload};
 use lager_tests::{Domain, Running, wait_for};
-use lager_topics::{MissionQueue, NavStatus, Phase, Qos, Role, Stamp, Topic, payload};
+use lager_topics::{MissionQueue, NavStatus, Phase, Role};
 use rustix::process::Signal;
 use serde_json::Value;
 
 payload! {
-    /// What a weather station sees.
+    /// The measurements of a weather station.
     pub struct Weather: 8 bytes {
         /// Wind in mm/s.
         pub wind: u32,
-        /// From where it blows, in degrees; 65535 = not known.
+        /// The direction from which the wind blows, in degrees; 65535 = not known.
         pub from: u16 = u16::MAX,
         /// Fills the gap.
         pub reserved: [u8; 2],
     }
 }
 
-/// A topic that is in no table.
+/// A topic that the robot's table does not have.
 #[derive(Clone, Copy, Debug)]
 struct WeatherNow;
 
 impl Topic for WeatherNow {
     const NAME: &'static str = "weather/now";
     type Payload = Weather;
-    const QOS: Qos = Qos::stream(64).waking(&[Role::Guest]);
+    const QOS: Qos = Qos::stream(64).waking(&[Role::Guest.part()]);
     const SUMMARY: &'static str = "The weather.";
 }
 
@@ -46,7 +46,7 @@ fn guest(domain: &Domain) -> Bus {
     Bus::open(&domain.bus("r1", 1.0), Role::Guest).expect("the bus opens")
 }
 
-/// Hears that many samples.
+/// Receives this number of samples.
 fn hear(from: &mut Subscriber<WeatherNow>, samples: usize) -> Vec<(Weather, Stamp)> {
     let mut heard = Vec::new();
     wait_for("the samples", || {
@@ -91,7 +91,7 @@ fn what_a_person_writes_is_published_on_a_topic_of_his_own() {
         "--rate",
         "50",
     ];
-    // A reader meets a writer when it looks, so it looks while the tool runs.
+    // A subscriber finds its publisher only when it looks, so it looks while the tool runs.
     let mut tool = domain.start(&[&thrice[..], &["--count", "3"]].concat());
     let heard = hear(&mut weather, 3);
     assert_eq!(tool.wait(), Some(0), "{}", tool.log());
@@ -101,14 +101,14 @@ fn what_a_person_writes_is_published_on_a_topic_of_his_own() {
         "{told}"
     );
     for (number, (weather, stamp)) in heard.iter().enumerate() {
-        // Nobody told the blank values of a topic that is in no table.
+        // The tool knows no default values of a topic outside the table.
         assert_eq!((weather.wind, weather.from), (3_200, 0));
         assert_eq!(stamp.sequence, number as u64);
     }
     let span = heard[2].1.publish_time_ns - heard[0].1.publish_time_ns;
     assert!(span > 30_000_000, "three at 50 Hz in {span} ns");
 
-    // Each value of standard input; the first one that does not fit ends it.
+    // It publishes each value of standard input; the first one that does not fit ends it.
     let mut tool = domain
         .lager(&["topic", "pub", "weather/now", "--json"])
         .stdin(Stdio::piped())
@@ -149,7 +149,7 @@ fn what_a_person_writes_is_published_on_a_topic_of_his_own() {
         );
     }
 
-    // Beside another writer only if that is meant.
+    // It publishes beside another writer only with a flag.
     let other = bus.publisher::<WeatherNow>().expect("a topic");
     let refused = domain.run(&["topic", "pub", "weather/now", "{}"]);
     assert_eq!(refused.status.code(), Some(1), "{}", said(&refused));
@@ -181,7 +181,7 @@ fn what_moves_a_robot_is_published_beside_it_only_if_that_is_meant() {
         told.contains("logic would act on it") && told.contains("--live"),
         "{told}"
     );
-    // What one service alone writes is never published beside it.
+    // It never publishes on a topic that one service alone writes.
     for topic in ["sensor/line", "nav/status", "link/health"] {
         let refused = domain.run(&["topic", "pub", topic, "{}", "--live"]);
         let told = said(&refused);
@@ -206,7 +206,7 @@ fn what_moves_a_robot_is_published_beside_it_only_if_that_is_meant() {
     up.signal(Signal::INT);
     up.wait();
     drop((queue, observer));
-    // Without a robot it is published, and none can start meanwhile.
+    // Without a robot it publishes, and no robot can start meanwhile.
     let mut tool = domain.start(&[&order[..], &["--rate", "100"]].concat());
     wait_for("the tool to have the name", || {
         let lock = domain.bus_folder().join("r1/bridge.lock");
@@ -231,7 +231,7 @@ fn rates_delays_bytes_and_fields_are_shown_for_as_long_as_is_asked() {
             .map(|line| serde_json::from_str(line).expect("JSON"));
         values.collect()
     };
-    // A count is of samples, whatever the tool.
+    // In every tool, `--count` counts samples.
     for tool in ["hz", "bw", "delay"] {
         let windows = json(&[tool, "sensor/line", "--count", "30"]);
         let samples: u64 = windows.iter().filter_map(|w| w["samples"].as_u64()).sum();
@@ -268,12 +268,12 @@ fn rates_delays_bytes_and_fields_are_shown_for_as_long_as_is_asked() {
     );
 }
 
-/// Sends weather, and leaves out one number in ten.
+/// Publishes weather, and leaves out one number in ten.
 fn send_with_gaps(publisher: &Publisher<WeatherNow>, number: &mut u64) {
     let next = Stamp {
         sequence: *number + *number / 9,
-        publish_time_ns: lager_ports::Clock::monotonic_ns(),
-        source_time_ns: lager_ports::Clock::monotonic_ns(),
+        publish_time_ns: lager_home::Clock::monotonic_ns(),
+        source_time_ns: lager_home::Clock::monotonic_ns(),
         epoch: publisher.epoch(),
         writer: std::process::id(),
         ..Stamp::default()
@@ -342,7 +342,7 @@ fn a_topic_that_loses_samples_stands_first_and_closed_ones_are_not_read() {
     assert_eq!(line["writers"][0]["role"], "bridge", "{line}");
     assert_eq!(value["sensor"]["up"], true, "{value}");
 
-    // What does not pass the filter is neither shown nor read.
+    // Samples that do not pass the filter are neither shown nor decoded.
     let value: Value =
         serde_json::from_str(&top(&["--json", "--filter", "weather"])).expect("JSON");
     assert_eq!(value["topics"].as_array().map(Vec::len), Some(1), "{value}");

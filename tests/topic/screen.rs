@@ -1,21 +1,22 @@
-//! `lager top` on a real terminal: in tmux at 80 x 24 and at 200 x 60, beside a robot that drives.
+//! Tests `lager top` on a real terminal: in tmux at 80 x 24 and at 200 x 60, beside a robot that
+//! drives.
 //!
-//! The pictures in `pictures/` are what tmux had on its screen when they were taken, with a dot for
-//! whatever another second would show otherwise: numbers, ages, the mission. `LAGER_PICTURES=take`
-//! takes them anew.
+//! The pictures in `pictures/` are tmux's screens at an earlier time, with a dot for each part that
+//! changes every second: numbers, ages, the mission. `LAGER_PICTURES=take` takes them again.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Publisher};
+use lager_home::Clock;
+use lager_ports::Publisher;
+use lager_sample::Stamp;
 use lager_tests::{Domain, lager, wait_for};
-use lager_topics::Stamp;
 use rustix::process::Signal;
 
 use crate::{Weather, WeatherNow, guest, up};
 
-/// A terminal with `lager top` in it, which ends with the terminal.
+/// A terminal in which `lager top` runs. Dropping it ends both.
 struct Terminal {
     socket: PathBuf,
 }
@@ -41,7 +42,7 @@ impl Terminal {
 
     fn tmux(&self) -> Command {
         let mut command = Command::new("tmux");
-        // Inside of somebody else's tmux as well.
+        // So that it also works inside another tmux.
         command.env_remove("TMUX").env("LC_ALL", "C.UTF-8");
         command.arg("-S").arg(&self.socket);
         command
@@ -58,7 +59,7 @@ impl Terminal {
         self.done(&[&["send-keys"], keys].concat());
     }
 
-    /// What is on the screen.
+    /// The text on the screen.
     fn picture(&self) -> String {
         self.done(&["capture-pane", "-p"])
     }
@@ -76,7 +77,7 @@ impl Drop for Terminal {
     }
 }
 
-/// Who sends weather, and from some moment on leaves out one number in ten.
+/// A program that publishes weather, and later leaves out one number in ten.
 struct Sender {
     publisher: Publisher<WeatherNow>,
     next: u64,
@@ -100,7 +101,7 @@ impl Sender {
         self.next += u64::from(self.loses && self.next.is_multiple_of(10));
     }
 
-    /// Goes on until the screen is as it should be, and returns what is on it.
+    /// Publishes until the screen is as it should be, and returns its text.
     fn until(&mut self, terminal: &Terminal, what: &str, is_it: impl Fn(&str) -> bool) -> String {
         wait_for(what, || {
             for _ in 0..10 {
@@ -113,21 +114,21 @@ impl Sender {
     }
 }
 
-/// The first line below the head of the table.
+/// The first line below the table's head.
 fn first_row(picture: &str) -> &str {
     let mut rows = picture.lines();
     rows.find(|line| line.starts_with(" TOPIC") || line.starts_with(" vTOPIC"));
     rows.next().unwrap_or_default()
 }
 
-/// The head of the table as it is, and every other line as words, with a dot for what changes.
+/// The table's head unchanged, and every other line as words with a dot for each changing part.
 fn structure(picture: &str) -> String {
     let mut lines = Vec::new();
     let mut ends: Vec<usize> = Vec::new();
     for line in picture.lines() {
         if line.contains("TOPIC") && line.contains("WRITER") {
             lines.push(line.trim_end().to_owned());
-            // Figures end where their heads do.
+            // Figures end in the column in which their heads end.
             let numbers = line.find("READERS").expect("a column");
             let letters: Vec<char> = line.chars().chain([' ']).collect();
             let places = numbers..letters.len() - 1;
@@ -150,7 +151,7 @@ fn structure(picture: &str) -> String {
         let mut shown: Vec<String> = words.filter(|word| !is_bar(word)).map(shown).collect();
         let known = match shown.first().map(String::as_str) {
             Some("mission") => 1,
-            // There may be nothing in the last second.
+            // In the last second there may be no value.
             Some("path") => shown
                 .iter()
                 .position(|word| word == "p50" || word == "none")
@@ -159,11 +160,11 @@ fn structure(picture: &str) -> String {
         };
         shown.truncate(known);
         if is_row {
-            // As much of a role as a long process number leaves.
+            // Beside a long process number only the beginning of the role has room.
             shown[1] = shown[1].chars().take(4).collect();
         }
         if shown.iter().any(|word| word.starts_with('+')) {
-            // Of several writers the one that wrote last.
+            // Of several writers, the table shows the one that wrote last.
             shown[1] = "·".to_owned();
         }
         lines.push(shown.join(" "));
@@ -175,7 +176,7 @@ fn is_bar(word: &str) -> bool {
     word.chars().all(|letter| "▁▂▃▄▅▆▇█".contains(letter))
 }
 
-/// A word, or a dot in place of a number, a unit that depends on one, or nothing.
+/// A word, or a dot in place of a number, of a unit that depends on it, or of nothing.
 fn shown(word: &str) -> String {
     let bare = word.strip_prefix('x').unwrap_or(word);
     let is_number = bare.starts_with(|letter: char| letter.is_ascii_digit());
@@ -190,9 +191,9 @@ fn shown(word: &str) -> String {
     }
 }
 
-/// Compares with the picture that was kept.
+/// Compares with the saved picture.
 fn check(name: &str, picture: &str) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("topic/pictures");
+    let folder = lager_tests::in_tree("tests/topic/pictures");
     let path = folder.join(name);
     let seen = structure(picture);
     if std::env::var_os("LAGER_PICTURES").is_some() {
@@ -217,7 +218,7 @@ fn on_a_terminal_it_is_as_the_pictures_and_a_topic_that_begins_to_lose_comes_fir
     let is_well = |picture: &str| picture.contains("autonomous") && picture.contains("TOPIC");
     sender.until(&terminal, "the screen", is_well);
 
-    // The planted fault.
+    // From now on the program leaves numbers out.
     sender.loses = true;
     let planted = Instant::now();
     let is_first = |picture: &str| first_row(picture).starts_with("!weather/now");
@@ -231,7 +232,7 @@ fn on_a_terminal_it_is_as_the_pictures_and_a_topic_that_begins_to_lose_comes_fir
     let row = coloured.lines().find(|line| line.contains("!weather/now"));
     assert!(row.is_some_and(|row| row.contains("[38;5;1m")), "{row:?}");
 
-    // By name, so that what a busy machine does to other topics moves no row.
+    // Sorted by name, so that a busy machine changes no row's place.
     terminal.keys(&[">"]);
     let is_by_name = |picture: &str| first_row(picture).contains("latency/command");
     check(
@@ -261,7 +262,7 @@ fn on_a_terminal_it_is_as_the_pictures_and_a_topic_that_begins_to_lose_comes_fir
     sender.until(&terminal, "the filter", |picture| {
         picture.contains("weather/now") && !picture.contains("sensor/line")
     });
-    // What is filtered out or closed is not subscribed to.
+    // `top` does not subscribe to topics that are filtered out or closed.
     let observers = |topic: &str| {
         let topics = bus.topics().expect("the bus");
         topics

@@ -1,9 +1,10 @@
-//! Bare iceoryx2, as its own examples use it: its stock `ipc` service, its ports, nothing between.
+//! The baseline of bare iceoryx2, used as in its own examples: its `ipc` service and its ports.
 //!
-//! Three kinds of line differ in what they carry besides the sample: the same header as the typed
-//! ports and the same limits ([`Stamp`]), no header and no clock but the same limits, and
-//! iceoryx2's own defaults. The same limits include the transport's configuration, which is the
-//! robot's own ([`Member::join`]). A receiver looks without pause, or sleeps on an iceoryx2 event
+//! It comes in three variants. The first has the typed ports' header ([`Stamp`]) and limits; the
+//! second has their limits, but neither header nor clock; the third has iceoryx2's own defaults.
+//! The limits include the transport's configuration, which is the robot's ([`Member::join`]). A
+//! receiver looks without pause, or sleeps on an iceoryx2 event that the sender notifies after
+//! publishing.
 //! that the sender notifies after publishing.
 
 use core::fmt::Debug;
@@ -20,24 +21,25 @@ use iceoryx2::prelude::{
     LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
 };
 use iceoryx2::service::port_factory::{event, publish_subscribe};
-use lager_ports::{BusConfig, Clock};
-use lager_topics::{Qos, Stamp};
+use lager_home::Clock;
+use lager_ports::BusConfig;
+use lager_sample::{Qos, Stamp};
 
 use super::{End, Slept, TIME_OUT, sleep_until, spin};
 use crate::error::{BenchError, Fault, broken};
 use crate::sample::Sample;
 
-/// Samples a subscriber may hold, as the typed ports allow.
+/// The number of samples that a subscriber may hold, as in the typed ports.
 const MAX_HELD: usize = 4;
 
-/// What stands in front of each sample.
+/// The header in front of each sample.
 pub(crate) trait Header: Copy + Debug + Default + ZeroCopySend + 'static {
-    /// That of a stream's first sample; the stream begins now and is this process's.
+    /// The header of the first sample of a stream that this process begins now.
     fn first() -> Self {
         Self::default()
     }
 
-    /// That of the sample after this one.
+    /// The header of the next sample.
     fn next(self) -> Self {
         self
     }
@@ -65,16 +67,16 @@ impl Header for Stamp {
 
 impl Header for () {}
 
-/// A process's membership.
+/// A process's membership in the transport.
 pub(crate) struct Member {
     node: Node<ipc::Service>,
     limits: Option<Qos>,
 }
 
 impl Member {
-    /// Joins the transport of that bus, configured as the typed ports are: among others with as
-    /// many places for what writers that have ended left unread. Its topics get these limits;
-    /// `None` = iceoryx2's own defaults for all that is no matter of the place.
+    /// Joins the transport of that bus. Its configuration is that of the typed ports, with as many
+    /// places for unread samples of writers that have ended. Topics get the limits `limits`; `None`
+    /// = iceoryx2's own defaults, except for the folders.
     pub(crate) fn join(bus: &BusConfig, limits: Option<Qos>) -> Result<Self, BenchError> {
         set_log_level(LogLevel::Fatal);
         let mut config = config(bus)?;
@@ -89,7 +91,7 @@ impl Member {
         Ok(Self { node, limits })
     }
 
-    /// A publisher of any payload.
+    /// A publisher of the payload `P`.
     pub(crate) fn sender<P: Debug + ZeroCopySend + 'static, H: Header>(
         &self,
         name: &str,
@@ -101,7 +103,7 @@ impl Member {
         Ok(Sender { publisher, header })
     }
 
-    /// A subscriber to any payload.
+    /// A subscriber to the payload `P`.
     pub(crate) fn subscriber<P: Debug + ZeroCopySend, H: Header>(
         &self,
         name: &str,
@@ -111,7 +113,7 @@ impl Member {
         })
     }
 
-    /// What rings at every listener of an event.
+    /// The notifier of an event, which wakes all its listeners.
     pub(crate) fn notifier(
         &self,
         name: &str,
@@ -122,7 +124,7 @@ impl Member {
         })
     }
 
-    /// What is rung at.
+    /// A listener of an event.
     pub(crate) fn listener(
         &self,
         name: &str,
@@ -166,13 +168,13 @@ impl Member {
             .service_builder(&ServiceName::new(name)?)
             .event()
             .max_listeners(listeners)
-            // Each wake looks at every id there may be, so one is the fastest.
+            // A listener looks at every possible id on each wake, so one id is the fastest.
             .event_id_max_value(0)
             .open_or_create()?)
     }
 }
 
-/// What `lager config --iceoryx2` shows.
+/// The configuration that `lager config --iceoryx2` shows.
 fn config(bus: &BusConfig) -> Result<Config, BenchError> {
     const WHAT: &str = "its configuration";
     let shown = bus.iceoryx2_toml().map_err(|error| failed(WHAT, error))?;
@@ -185,7 +187,7 @@ fn failed(what: &str, detail: impl Debug) -> BenchError {
     ))
 }
 
-/// Tries again while the other process is in the middle of creating or removing the same thing.
+/// Tries again while the other process is creating or removing the same thing.
 fn patiently<T>(
     what: &str,
     mut attempt: impl FnMut() -> Result<T, Box<dyn Error>>,
@@ -201,7 +203,7 @@ fn patiently<T>(
     }
 }
 
-/// Publishes with a header of one's own.
+/// A publisher that fills in a header.
 pub(crate) struct Sender<P: Debug + ZeroCopySend + 'static, H: Header> {
     publisher: Publisher<ipc::Service, P, H>,
     header: H,
@@ -237,7 +239,7 @@ pub(crate) fn listening(
     member: &Member,
     [out, back]: [&str; 2],
 ) -> Result<impl End + use<>, BenchError> {
-    // As many as iceoryx2 allows by default.
+    // iceoryx2's default.
     const LISTENERS: usize = 16;
     let listener = member.listener(back, LISTENERS)?;
     let notifier = member.notifier(out, LISTENERS)?;

@@ -1,5 +1,5 @@
-//! A slot in shared memory: watched without pause (`cacheline`), or with a `futex` or an `eventfd`
-//! to sleep on. The path's floor is made of the one with a futex, too.
+//! The baselines of shared memory: a slot that the receiver watches without pause (`cacheline`), or
+//! with a `futex` or an `eventfd` to sleep on. The path's floor uses the slot with a futex, too.
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::os::fd::OwnedFd;
@@ -12,7 +12,7 @@ use super::{End, Slept, TIME_OUT, sleep_until, spin};
 use crate::error::Fault;
 use crate::sample::{Block, Sample};
 
-/// A cache line that holds a block; the number is written last.
+/// A block in one cache line; the writer writes the block's number last.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Slot<const WORDS: usize> {
@@ -46,7 +46,7 @@ impl<const WORDS: usize> Slot<WORDS> {
 pub(crate) struct Word(AtomicU32);
 
 impl Word {
-    /// Counts up and wakes one sleeper, sleeping or not.
+    /// Counts up and wakes one process, if one sleeps.
     pub(crate) fn wake(&self) -> rustix::io::Result<()> {
         self.0.fetch_add(1, Ordering::Release);
         futex::wake(&self.0, futex::Flags::empty(), 1).map(|_| ())
@@ -71,7 +71,7 @@ impl Word {
     }
 }
 
-/// What one direction of a line needs of shared memory.
+/// The shared memory of one direction of a line.
 #[derive(Debug)]
 #[repr(C)]
 pub(crate) struct Lane<const WORDS: usize> {
@@ -80,14 +80,14 @@ pub(crate) struct Lane<const WORDS: usize> {
 }
 
 impl<const WORDS: usize> Lane<WORDS> {
-    /// Writes the block and wakes who sleeps for it.
+    /// Writes the block, and wakes the process that sleeps for it.
     pub(crate) fn put(&self, block: &Block<WORDS>) -> Result<(), Fault> {
         self.slot.write(block);
         Ok(self.word.wake()?)
     }
 
     /// Sleeps until the count is no longer `seen`, and reads the block. Gives up after
-    /// [`super::LIMIT`]; a process that is stopped meanwhile counts one time-out.
+    /// [`super::LIMIT`]. While a process is stopped by a signal, only one time-out counts.
     pub(crate) fn take(&self, seen: &mut u32) -> Result<Block<WORDS>, Fault> {
         let before = *seen;
         let look = || {
@@ -99,7 +99,7 @@ impl<const WORDS: usize> Lane<WORDS> {
     }
 }
 
-/// A direction each way, for two processes.
+/// Two lanes, one for each direction between two processes.
 #[derive(Debug)]
 #[repr(C)]
 pub(crate) struct Lanes<const WORDS: usize>(pub(crate) [Lane<WORDS>; 2]);
@@ -108,7 +108,7 @@ pub(crate) struct Lanes<const WORDS: usize>(pub(crate) [Lane<WORDS>; 2]);
 #[allow(unsafe_code)]
 unsafe impl<const WORDS: usize> Shareable for Lanes<WORDS> {}
 
-/// A cache line each way, watched without pause.
+/// A cache line each way, which the receiver watches without pause.
 pub(crate) fn cache_line(out: &Lane<8>, back: &Lane<8>) -> impl End {
     let (out, back) = (&out.slot, &back.slot);
     let mut seen = back.number();

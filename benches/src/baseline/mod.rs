@@ -1,7 +1,7 @@
-//! The barest ways to hand 64 bytes to another process, each as one end of a line.
+//! The baselines: the simplest ways to hand 64 bytes to another process, each as one end of a line.
 //!
-//! Baselines do no more than they must: no header, no count of losses, no protection against a
-//! killed process. What they lack is what the typed ports are compared for.
+//! A baseline has no header, no count of losses and no protection against a killed process, so the
+//! comparison shows the cost of these in the typed ports.
 
 pub(crate) mod iceoryx;
 pub(crate) mod memory;
@@ -15,16 +15,16 @@ use std::time::Instant;
 use crate::error::Fault;
 use crate::sample::Sample;
 
-/// How long a sleeping receiver sleeps before it looks whether it was forgotten: the same for the
-/// typed ports and for every baseline that has a time-out.
+/// How long a sleeping receiver sleeps before it looks for a sample without a wake-up. It is the
+/// same for the typed ports and for every baseline with a time-out.
 pub(crate) const TIME_OUT: Duration = Duration::from_millis(100);
 
-/// How long a receiver waits for a sample before it gives up the measurement.
+/// How long a receiver waits for a sample before the measurement fails.
 pub(crate) const LIMIT: Duration = Duration::from_secs(5);
 
 /// One end of a line between two processes: how it sends, and how it receives.
 pub(crate) trait End {
-    /// Hands the sample over.
+    /// Sends the sample to the other end.
     fn send(&mut self, sample: &Sample) -> Result<(), Fault>;
 
     /// Waits for the next sample in the end's own way.
@@ -45,10 +45,10 @@ where
     }
 }
 
-/// Looks without pause until `look` finds something, at most [`LIMIT`]. Between two looks it tells
-/// the processor that it spins, as a waiter of the typed ports does.
+/// Looks without pause until `look` finds something, at most [`LIMIT`]. Between two looks it gives
+/// the processor the hint that it spins, as a waiter of the typed ports does.
 pub(crate) fn spin<T>(mut look: impl FnMut() -> Result<Option<T>, Fault>) -> Result<T, Fault> {
-    // Reading the clock costs as much as looking, so it is read now and then.
+    // Reading the clock takes as long as a look, so it is read once in this number of looks.
     const LOOKS: u32 = 10_000;
     let start = Instant::now();
     loop {
@@ -64,17 +64,17 @@ pub(crate) fn spin<T>(mut look: impl FnMut() -> Result<Option<T>, Fault>) -> Res
     }
 }
 
-/// How a sleep ended.
+/// How a sleep has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Slept {
-    /// Somebody may have something.
+    /// Another process rang, so there may be a sample.
     Woken,
-    /// Nobody called for [`TIME_OUT`].
+    /// Nobody rang for [`TIME_OUT`].
     TimedOut,
 }
 
-/// Looks and sleeps in turn until `look` finds something; gives up after as many time-outs as
-/// make up [`LIMIT`].
+/// Looks and sleeps in turn until `look` finds something. Gives up when the time-outs add up to
+/// [`LIMIT`].
 pub(crate) fn sleep_until<T>(
     mut look: impl FnMut() -> Result<Option<T>, Fault>,
     mut sleep: impl FnMut() -> Result<Slept, Fault>,
@@ -97,7 +97,7 @@ pub(crate) fn sleep_until<T>(
 pub(crate) mod tests {
     use super::*;
 
-    /// Samples pass from one end to the other and back.
+    /// Sends samples from one end to the other and back.
     pub(crate) fn pass(mut first: impl End, mut second: impl End + Send) {
         std::thread::scope(|scope| {
             scope.spawn(move || {

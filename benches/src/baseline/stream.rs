@@ -1,10 +1,10 @@
-//! Bytes through the kernel: a pipe each way, a Unix datagram socket, a TCP connection over
-//! loopback. The descriptors are inherited; receivers sleep in `read`, without a time-out.
+//! The baselines through the kernel: a pipe each way, a Unix datagram socket, and TCP over
+//! loopback. Children inherit the descriptors. Receivers sleep in `read`, without a time-out.
 
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::os::fd::OwnedFd;
 
-use lager_topics::bytes_of;
+use lager_sample::bytes_of;
 use rustix::io::{Errno, FdFlags, fcntl_setfd, read, write};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
 
@@ -12,9 +12,9 @@ use super::End;
 use crate::error::Fault;
 use crate::sample::{SIZE, Sample};
 
-/// An end that writes into one descriptor and reads from one.
+/// An end that writes to one descriptor and reads from the other.
 pub(crate) fn end(out: &OwnedFd, back: &OwnedFd) -> impl End {
-    // All three take 64 bytes whole while there is room, and one sample is on its way at a time.
+    // Each of the three takes 64 bytes in one piece, because only one sample is on its way.
     let send = move |sample: &Sample| match write(out, bytes_of(sample))? {
         SIZE => Ok(()),
         short => Err(Fault::Broken(format!(
@@ -29,7 +29,7 @@ pub(crate) fn end(out: &OwnedFd, back: &OwnedFd) -> impl End {
     (send, receive)
 }
 
-/// Sleeps until all of `bytes` has come.
+/// Reads, asleep, until `bytes` is full.
 pub(crate) fn read_whole(from: &OwnedFd, mut bytes: &mut [u8]) -> Result<(), Fault> {
     while !bytes.is_empty() {
         match read(from, &mut *bytes) {

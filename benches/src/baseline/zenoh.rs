@@ -1,24 +1,24 @@
-//! Zenoh, as its own examples play ping-pong: two peers of one machine on a Unix socket, each with
-//! a publisher and a subscriber, nothing between.
+//! The baseline of Zenoh, used as in its own ping-pong examples: two peers of one machine on a Unix
+//! socket, each with a publisher and a subscriber.
 //!
 //! ```text
 //!   process ─ put ─> socket ─> Zenoh's receiving thread ─ channel ─> process, asleep in `recv`
 //! ```
 //!
-//! A receiver is woken twice: the kernel wakes a thread of Zenoh's, which hands the sample to the
-//! process through the channel that is Zenoh's default. Sending is the process's own thread's work
-//! down to the socket. All of Zenoh's threads stay on the core of the process they belong to,
-//! because the process is bound to it before there are any.
+//! The kernel wakes a thread of Zenoh, and that thread wakes the receiving process through Zenoh's
+//! default channel: two wake-ups. The sending process writes to the socket in its own thread. All
+//! of Zenoh's threads run on their process's core, because the process is bound to it before they
+//! start.
 //!
-//! Nobody is looked for and nothing is announced: the second process is told the socket of the
-//! first, and neither listens anywhere else. Zenoh's shared memory has no part in it, because Zenoh
-//! itself uses it only for samples of some thousand bytes.
+//! The second process is told the first one's socket, so the peers neither search nor announce
+//! themselves. Zenoh's shared memory is not used: Zenoh uses it only for samples of some 1000
+//! bytes.
 
 use core::fmt::Display;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use lager_topics::bytes_of;
+use lager_sample::bytes_of;
 use serde_json::json;
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Wait};
@@ -27,9 +27,9 @@ use super::{End, LIMIT};
 use crate::error::{BenchError, Fault, broken};
 use crate::sample::{SIZE, Sample};
 
-/// An end that puts to `out` and subscribes to `back`; the first one makes the socket, the other
-/// connects as soon as it is there. Returns when the other end subscribes to `out`, so that not
-/// even the first sample is lost. The socket is gone when the end is.
+/// An end that puts to `out` and subscribes to `back`. The first end makes the socket, and the
+/// other connects when it exists. Returns when the other end has subscribed to `out`, so not even
+/// the first sample is lost. The socket is removed with the end.
 pub(crate) fn meet(
     socket: &Path,
     is_first: bool,
@@ -41,7 +41,7 @@ pub(crate) fn meet(
     let subscriber = session.declare_subscriber(back).wait().map_err(failed)?;
     let publisher = session
         .declare_publisher(out)
-        // Neither dropped nor gathered into batches: one sample is on its way at a time.
+        // Neither drops nor batches a sample: only one is on its way at a time.
         .congestion_control(CongestionControl::Block)
         .express(true)
         .wait()
@@ -56,7 +56,7 @@ pub(crate) fn meet(
     }
     let send = move |sample: &Sample| publisher.put(bytes_of(sample)).wait().map_err(broken);
     let receive = move || {
-        // Dropped with the end: it closes what the others need.
+        // The session must live as long as the end, which uses it.
         let _keeps = &session;
         let received = subscriber.recv_timeout(LIMIT).map_err(broken)?;
         let received = received.ok_or(Fault::Silent(LIMIT))?;
@@ -84,7 +84,7 @@ fn config(socket: &Path, is_first: bool) -> Result<Config, BenchError> {
             "endpoints": connect,
             "timeout_ms": u64::try_from(LIMIT.as_millis()).unwrap_or(u64::MAX),
             "exit_on_failure": true,
-            // The socket may come a moment later.
+            // The socket may appear a moment later.
             "retry": { "period_init_ms": 2, "period_max_ms": 20, "period_increase_factor": 2 },
         },
         "scouting": {

@@ -1,4 +1,4 @@
-//! Why the guard could not do its work; every message says what to do.
+//! The errors of the guard. Every message says what to do.
 
 use std::path::{Path, PathBuf};
 
@@ -13,19 +13,17 @@ pub(crate) enum GuardError {
     #[error("{0}: {1}")]
     Unusable(PathBuf, String),
     #[error(
-        "`{0}` yields `{1}` twice, so a limit on it would hold one of them only; give one of the rows another name or variant"
+        "`{0}` yields `{1}` twice, so a limit would apply to only one of them; give one of the rows another name or variant"
     )]
     Twice(String, String),
     #[error(
-        "`rustc -vV` does not say what it is ({0}); put the rustc that built the benches into PATH"
+        "`rustc -vV` shows neither version nor target ({0}); put the rustc that built the benches into PATH"
     )]
     Rustc(String),
     #[error("{0}: {1}")]
     Scenario(Scenario, BenchError),
     #[error("cycles: {0}")]
     Chip(BenchError),
-    #[error("the guard could not be started again with a slow-down: {0}")]
-    Trial(std::io::Error),
     #[error("`--only {0}` selects nothing; the sources that have limits are: {1}")]
     NoSuchSource(String, String),
     #[error(
@@ -34,7 +32,7 @@ pub(crate) enum GuardError {
     NoCounts(String),
 }
 
-/// What a file says.
+/// The text of a file.
 pub(crate) fn read(file: &Path) -> Result<String, GuardError> {
     std::fs::read_to_string(file).map_err(|error| GuardError::Unreadable(file.to_owned(), error))
 }

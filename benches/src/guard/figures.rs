@@ -1,5 +1,5 @@
-//! Named figures and where they come from: a report of ratios, callgrind's counts by way of
-//! gungraun, or the emulator. Nothing is judged here.
+//! Named figures and their sources: a report of ratios, callgrind's counts through gungraun, or the
+//! emulator. This module does not judge them.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,26 +11,26 @@ use serde_json::Value;
 
 use crate::error::GuardError;
 
-/// The sources that are counted: by callgrind, and by the emulator in chips.
+/// The sources of counts: callgrind, and the emulator of the chips.
 pub(crate) const INSTRUCTIONS: &str = "instructions";
 pub(crate) const CYCLES: &str = "cycles";
 
 /// The figures of one source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Figures {
-    /// `hop`, `path`, `fanout`, or what the limits call a counted source.
+    /// `hop`, `path`, `fanout`, or the name of a counted source in the limits.
     pub(crate) source: String,
-    /// What built the program, for counts.
+    /// The compiler that built the program, for counts.
     pub(crate) built: Option<Built>,
-    /// By name what each run has shown; the median counts.
+    /// The value of each run, by the figure's name. The median counts.
     pub(crate) runs: BTreeMap<String, Vec<f64>>,
-    /// The time that each ratio compares with its baseline's, in ns, by the same names.
+    /// The time of each ratio before it is divided by its baseline's, in ns, by the same names.
     pub(crate) times_ns: BTreeMap<String, f64>,
-    /// What this machine cannot measure, with the reason: the first words of figures' names.
+    /// What this machine cannot measure: the first words of the figures' names, and the reason.
     pub(crate) unmeasured: BTreeMap<String, String>,
 }
 
-/// Which compiler built a program, and for what.
+/// The compiler that built a program, and the target.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Built {
     /// The compiler's version, `1.95.0`.
@@ -39,25 +39,25 @@ pub(crate) struct Built {
     pub(crate) target: String,
 }
 
-/// The name of a ratio in its parts: `hop block same-core: lager / iceoryx2/event p50`.
+/// The name of a ratio, in parts: `hop block same-core: lager / iceoryx2/event p50`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RatioName<'a> {
-    /// What precedes ` / `: the name of the row.
+    /// The part before ` / `: the name of the row.
     pub(crate) row: &'a str,
     pub(crate) what: &'a str,
     pub(crate) mode: Mode,
     pub(crate) regime: Regime,
     pub(crate) label: &'a str,
-    /// The label that it is compared with.
+    /// The label of the row with which it is compared.
     pub(crate) to: &'a str,
 }
 
 impl<'a> RatioName<'a> {
-    /// `None` if it is not the name of a ratio.
+    /// Splits a name; `None` if it is not the name of a ratio.
     pub(crate) fn parse(text: &'a str) -> Option<Self> {
         let (row, compared) = text.split_once(" / ")?;
         let (group, label) = row.split_once(": ")?;
-        // A label may have a space in it.
+        // A label may contain a space.
         let (to, quantile) = compared.rsplit_once(' ')?;
         let [what, mode, regime] = group.split(' ').collect::<Vec<_>>()[..] else {
             return None;
@@ -75,7 +75,7 @@ impl<'a> RatioName<'a> {
 }
 
 impl Figures {
-    /// The median of what the runs have shown.
+    /// The median of the runs.
     pub(crate) fn get(&self, figure: &str) -> Option<f64> {
         median(self.runs.get(figure)?.clone())
     }
@@ -100,7 +100,7 @@ impl Figures {
         Ok(figures)
     }
 
-    /// The instruction counts that gungraun writes, one line of JSON for each bench.
+    /// The instruction counts that gungraun writes, a line of JSON for each bench.
     pub(crate) fn of_callgrind(file: &Path, text: &str, built: Built) -> Result<Self, GuardError> {
         let mut figures = Self::from_source(INSTRUCTIONS);
         figures.built = Some(built);
@@ -123,8 +123,8 @@ impl Figures {
         }
     }
 
-    /// The cycles of the boards' images, of those figures that have a limit: the others are for the
-    /// report of `lager bench chip`.
+    /// The cycles of the boards' images for the figures that have a limit. `lager bench chip`
+    /// reports the other figures.
     pub(crate) fn of_chips(
         report: ChipReport,
         limited: impl Fn(&str) -> bool,
@@ -148,7 +148,7 @@ impl Figures {
         self.unmeasured.contains_key(what)
     }
 
-    /// Puts the runs of two measurements of the same source together.
+    /// Joins the runs of two measurements of the same source.
     pub(crate) fn pooled_with(mut self, other: Self) -> Self {
         for (name, more) in other.runs {
             self.runs.entry(name).or_default().extend(more);
@@ -177,9 +177,9 @@ fn not_counts(file: &Path, why: &dyn std::fmt::Display) -> GuardError {
 }
 
 impl Built {
-    /// What `rustc -vV` says it is and builds for.
+    /// The compiler's version and target as `rustc -vV` prints them.
     pub(crate) fn by_rustc() -> Result<Self, GuardError> {
-        // Cargo names it for programs it starts, and otherwise it is the one in PATH.
+        // Cargo gives the compiler's path to programs that it starts; otherwise it is in PATH.
         let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
         let output = std::process::Command::new(rustc).arg("-vV").output();
         let output = output.map_err(|error| GuardError::Rustc(error.to_string()))?;
@@ -276,7 +276,7 @@ mod tests {
             runs: [("a".to_owned(), runs.to_vec())].into(),
             ..Figures::default()
         };
-        // One lucky run does not decide, and one unlucky one does not either.
+        // Neither one lucky run nor one unlucky run decides.
         let pooled = of(&[1.3, 1.2, 1.4]).pooled_with(of(&[0.5, 1.25, 9.0]));
         assert_eq!(pooled.get("a"), Some(1.275));
     }

@@ -1,5 +1,5 @@
-//! Figures against limits, as a pure function. A limit that nothing was measured for is broken:
-//! a renamed bench must not slip out of the guard's sight.
+//! Compares figures with their limits, as a pure function. A limit without a measured figure is
+//! broken, so the guard notices a renamed bench.
 
 use core::fmt;
 
@@ -8,23 +8,23 @@ use serde::Serialize;
 use crate::figures::Figures;
 use crate::limits::{Counted, Limit, Limits};
 
-/// What became of one limit.
+/// The result of one limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Verdict {
-    /// The figure keeps it.
+    /// The figure keeps the limit.
     Kept,
-    /// The figure exceeds it.
+    /// The figure exceeds the limit.
     Broken,
     /// There is no such figure.
     Missing,
-    /// The figure is of a target for which the limit says nothing, or this machine cannot measure
-    /// it; a note says why.
+    /// The limit does not apply to this target, or this machine cannot measure the figure. A note
+    /// gives the reason.
     NotJudged,
 }
 
 impl Verdict {
-    /// Whether the guard fails.
+    /// Whether this result makes the guard fail.
     pub(crate) fn fails(self) -> bool {
         matches!(self, Self::Broken | Self::Missing)
     }
@@ -41,21 +41,21 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// One limit and what became of it.
+/// One limit and its result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Judgement {
     pub(crate) source: String,
     pub(crate) figure: String,
     pub(crate) measured: Option<f64>,
     pub(crate) limit: f64,
-    /// Whether the limit is one from below.
+    /// The figure must be at least the limit, not at most.
     pub(crate) at_least: bool,
     pub(crate) goal: Option<f64>,
     pub(crate) verdict: Verdict,
     pub(crate) reason: String,
 }
 
-/// Judges the figures of one source by its limits, and says what else a reader should know.
+/// Judges the figures of one source by its limits; also returns notes for the reader.
 pub(crate) fn judge(limits: &Limits, figures: &Figures) -> (Vec<Judgement>, Vec<String>) {
     let counted = limits.counted.get(&figures.source);
     let (margin, mut notes) = conditions(counted, figures);
@@ -70,12 +70,12 @@ pub(crate) fn judge(limits: &Limits, figures: &Figures) -> (Vec<Judgement>, Vec<
     (judgements, notes)
 }
 
-/// How far counts may be off.
+/// How far a count may exceed the measured one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Margin {
-    /// As far as the limit itself says, or else this many percent.
+    /// The limit's own percentage, or this one if it has none.
     OrElse(f64),
-    /// This many percent, whatever the limit says.
+    /// This percentage, whatever the limit says.
     All(f64),
     /// The counts are of another target.
     NotJudged,
@@ -92,7 +92,7 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
             Margin::All(percent) => percent,
             Margin::NotJudged => 0.0,
         };
-        // Counts are whole.
+        // A count is a whole number.
         (count * (1.0 + margin_percent / 100.0)).floor()
     });
     let measured = figures.get(&limit.figure);
@@ -100,7 +100,7 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
         None if figures.cannot_be_measured(&limit.figure) => Verdict::NotJudged,
         None => Verdict::Missing,
         Some(_) if margin == Margin::NotJudged => Verdict::NotJudged,
-        // Written so that a figure that is no number breaks the limit.
+        // NaN matches neither condition, so it breaks the limit.
         Some(value) if at_least && value >= bound => Verdict::Kept,
         Some(value) if !at_least && value <= bound => Verdict::Kept,
         Some(_) => Verdict::Broken,
@@ -117,7 +117,7 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
     }
 }
 
-/// The margin that counts get, and a sentence if it is another one than usual.
+/// The margin of the counts, and a sentence if it is not the usual one.
 fn conditions(counted: Option<&Counted>, figures: &Figures) -> (Margin, Vec<String>) {
     let (Some(counted), Some(built)) = (counted, &figures.built) else {
         return (Margin::OrElse(0.0), Vec::new());
@@ -141,10 +141,10 @@ fn conditions(counted: Option<&Counted>, figures: &Figures) -> (Margin, Vec<Stri
     (Margin::OrElse(counted.margin_percent), Vec::new())
 }
 
-/// What has become so much less that its limit would let a regression through, and what nobody
-/// has limited.
+/// Notes on the counts that are now so low that their limit would let a regression pass, and on the
+/// counts that have no limit.
 fn notes_on_counts(limits: &Limits, figures: &Figures) -> Vec<String> {
-    // Below the measured count by more than this the limit has come loose.
+    // A limit is too loose when the count is below this part of the measured one.
     const LOOSE: f64 = 0.9;
     let source = &figures.source;
     let note = |name: &String| {
@@ -152,7 +152,7 @@ fn notes_on_counts(limits: &Limits, figures: &Figures) -> Vec<String> {
         match limits.of(source).find(|limit| limit.figure == *name) {
             None => Some(format!("{source}: `{name}` ({value}) has no limit")),
             Some(limit) if value < limit.measured.unwrap_or(0.0) * LOOSE => Some(format!(
-                "{source}: `{name}` has come down to {value}; write that into the file of limits, so that it stays there"
+                "{source}: `{name}` has come down to {value}; write that into the file of limits, so that it stays low"
             )),
             Some(_) => None,
         }
@@ -189,7 +189,7 @@ mod tests {
         Limits::parse(&text).unwrap()
     }
 
-    /// What becomes of the one limit of a source, and what is said beside.
+    /// Judges the one limit of a source; returns the result and the notes.
     fn judged(
         limits: &Limits,
         source: &str,
@@ -232,18 +232,18 @@ mod tests {
         for (limit, built, figure, value, expected, note) in [
             (count, "1 here", "send", 1050.0, Kept, ""),
             (count, "1 here", "send", 1051.0, Broken, ""),
-            // The limit's own margin comes first, unless the compiler is another.
+            // The limit's own margin comes first, unless another compiler built the program.
             (own, "1 here", "send", 1010.0, Kept, ""),
             (own, "1 here", "send", 1011.0, Broken, ""),
             (own, "2 here", "send", 1200.0, Kept, other),
             (count, "2 here", "send", 1200.0, Kept, other),
             (count, "2 here", "send", 1201.0, Broken, other),
-            // What is to be reached is judged from below, whatever the compiler.
+            // An `at_least` limit has no margin, whatever the compiler is.
             (reached, "2 here", "send", 0.5, Kept, other),
             (reached, "2 here", "send", 0.49, Broken, other),
             (reached, "2 here", "send", f64::NAN, Broken, other),
             (count, "1 there", "send", 9000.0, NotJudged, "not judged"),
-            // A limit without its figure fails even on another target.
+            // A limit without its figure fails even for another target.
             (
                 count,
                 "1 here",
@@ -274,7 +274,7 @@ mod tests {
         assert!(![Kept, NotJudged].iter().any(|verdict| verdict.fails()));
     }
 
-    /// Each figure of the images gets worse, alone, by 6 % of what its limit was made of.
+    /// Makes each figure of the images alone 6 % worse than the measured value behind its limit.
     #[test]
     fn six_percent_more_cycles_are_noticed() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("limits.toml");

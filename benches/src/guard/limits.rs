@@ -1,5 +1,5 @@
-//! The limits as they stand in `benches/limits.toml`, read strictly: a limit that was mistyped
-//! would guard nothing. Nothing is measured or judged here.
+//! Reads the limits in `benches/limits.toml`. It is strict, because a mistyped limit would guard
+//! nothing. It neither measures nor judges.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -11,11 +11,11 @@ use serde::Deserialize;
 use crate::error::{GuardError, read};
 use crate::figures::RatioName;
 
-/// Everything the file says.
+/// The content of the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Limits {
-    /// Where figures come from that are counted rather than timed, by name.
+    /// The sources whose figures are counted rather than timed, by name.
     #[serde(default)]
     pub(crate) counted: BTreeMap<String, Counted>,
     /// The limits.
@@ -23,23 +23,23 @@ pub(crate) struct Limits {
     pub(crate) limits: Vec<Limit>,
 }
 
-/// How far counts may be from the ones measured. Counts do not depend on the machine's load, but
-/// they do on the compiler.
+/// How far the counts of a source may be from the measured ones. Counts do not depend on the
+/// machine's load, but they depend on the compiler.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Counted {
-    /// The compiler that built what was counted.
+    /// The compiler that built the counted program.
     pub(crate) rustc: String,
-    /// What it was built for. Counts of another target are shown and not judged.
+    /// The target of that program. Counts of another target are shown and not judged.
     pub(crate) target: String,
-    /// By how much a count may exceed the measured one.
+    /// How far a count may exceed the measured one, in percent.
     pub(crate) margin_percent: f64,
-    /// The same if another compiler built it.
+    /// The same if another compiler built the program.
     pub(crate) margin_percent_other_rustc: f64,
 }
 
 /// One limit: on a ratio (`at_most`), on a count (`measured`, and the margin of its source), or on
-/// what a counted source yields beside its counts and the machine has a part in (`at_least`).
+/// a figure beside the counts that depends on the machine (`at_least`).
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Limit {
@@ -47,17 +47,17 @@ pub(crate) struct Limit {
     pub(crate) source: String,
     /// The figure's name within its source.
     pub(crate) figure: String,
-    /// What the figure must not exceed.
+    /// The largest allowed value.
     pub(crate) at_most: Option<f64>,
-    /// What the figure must reach.
+    /// The smallest allowed value.
     pub(crate) at_least: Option<f64>,
-    /// What the count was when this line was written.
+    /// The count at the time when this line was written.
     pub(crate) measured: Option<f64>,
-    /// By how much the count may exceed it, where the margin of its source would hide too much.
+    /// The limit's own margin, if the margin of its source would hide too much.
     pub(crate) margin_percent: Option<f64>,
-    /// What the project wants, if that is not what is held.
+    /// The project's goal, if it is not the same as the limit.
     pub(crate) goal: Option<f64>,
-    /// Why the limit is what it is.
+    /// The reason for this value.
     pub(crate) reason: String,
 }
 
@@ -67,7 +67,7 @@ impl Limits {
         Self::parse(&read(file)?).map_err(|why| GuardError::Unusable(file.to_owned(), why))
     }
 
-    /// What the text of a file says, or why it would not guard what it should.
+    /// The limits in a file's text, or a sentence why some of them would guard nothing.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let limits: Self = toml::from_str(text).map_err(|error| error.to_string())?;
         if limits.limits.is_empty() {
@@ -77,7 +77,7 @@ impl Limits {
             let (margin, other) = (counted.margin_percent, counted.margin_percent_other_rustc);
             if !(0.0 <= margin && margin <= other && other <= 100.0) {
                 return Err(format!(
-                    "[counted.{source}]: the margins are percentages from 0 to 100, and the one for another rustc is not the smaller one"
+                    "[counted.{source}]: the margins must be percentages from 0 to 100, and margin_percent_other_rustc must not be the smaller one"
                 ));
             }
         }
@@ -101,7 +101,7 @@ impl Limits {
 }
 
 impl Limit {
-    /// The name's parts, if it is of a ratio.
+    /// The parts of the figure's name, if the figure is a ratio.
     pub(crate) fn ratio(&self) -> Option<RatioName<'_>> {
         RatioName::parse(&self.figure)
     }
@@ -127,7 +127,7 @@ impl Limit {
         let is_timed = Scenario::from_str(&self.source, false).is_ok();
         if !is_timed && !counted.contains_key(&self.source) {
             return Err(format!(
-                "comes from what is neither hop, path or fanout nor described under [counted.{}]",
+                "has a source that is neither hop, path or fanout nor described under [counted.{}]",
                 self.source
             ));
         }
@@ -140,12 +140,12 @@ impl Limit {
                 }
             },
             (true, ..) => {
-                "is a ratio; give the limit itself (`at_most = …`), nothing that is measured, no margin and nothing to be reached"
+                "is a ratio; give the limit itself (`at_most = …`), without `measured`, `margin_percent` and `at_least`"
             }
             (false, None, None, Some(_)) => return Ok(()),
             (false, None, Some(_), None) if !margin => return Ok(()),
             (false, ..) => {
-                "is a count; give what was measured (`measured = …`), the margin comes from its source, or what is to be reached (`at_least = …`)"
+                "is a count; give the measured count (`measured = …`; its source has the margin), or the smallest allowed value (`at_least = …`)"
             }
         };
         Err(why.to_owned())

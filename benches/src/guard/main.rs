@@ -1,8 +1,8 @@
-//! The guard: measures, and fails when a limit of `benches/limits.toml` is broken.
+//! The guard: a program that measures, and fails if a limit of `benches/limits.toml` is broken.
 //!
-//! `benches/guard` is the way to run it: the script builds this, has callgrind count instructions,
-//! and hands the counts over. Apart from the library, because a scenario measures and asserts
-//! nothing, while this decides and measures nothing itself.
+//! Run it with `benches/guard`: the script builds it, starts callgrind to count instructions, and
+//! gives the guard the counts. The guard is apart from the library because a scenario measures and
+//! judges nothing, while the guard judges and leaves the measuring to the library.
 //!
 //! Exit codes: 0 all limits are kept, 1 a limit is broken or its figure is missing, 2 the guard
 //! could not do its work.
@@ -12,14 +12,13 @@ mod figures;
 mod judge;
 mod limits;
 mod measure;
-mod trial;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use lager_benches::chip::{self, ChipReport, Programs};
-use lager_benches::{Scenario, machine, median};
+use lager_benches::{Scenario, at_least_one, machine, median};
 use serde::Serialize;
 
 use crate::error::{GuardError, read};
@@ -28,8 +27,8 @@ use crate::judge::{Judgement, Verdict, judge};
 use crate::limits::Limits;
 use crate::measure::measure;
 
-/// Holds the bus, the path and the boards' images to their limits: ratios measured in one run, and
-/// counts of instructions and cycles.
+/// Checks the bus, the path and the boards' images against their limits: ratios measured in one
+/// run, and counts of instructions and cycles.
 ///
 /// Exit codes: 0 all limits are kept; 1 a limit is broken or its figure is missing; 2 the guard
 /// could not do its work.
@@ -37,7 +36,7 @@ use crate::measure::measure;
 #[command(
     name = "benches/guard",
     bin_name = "benches/guard",
-    after_help = "Examples:\n  benches/guard                        everything, about four minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json\n  benches/guard --only hop,path,fanout --spread 10    before a limit is changed\n  benches/guard --only hop,path,fanout --try          after that: does each limit hold?"
+    after_help = "Examples:\n  benches/guard                        everything, about four minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json\n  benches/guard --only hop,path,fanout --spread 10    before a limit is changed"
 )]
 struct Arguments {
     /// The limits
@@ -52,12 +51,9 @@ struct Arguments {
     /// How often to measure a scenario while one of its limits is broken; all runs count together
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
     attempts: usize,
-    /// Judge nothing: measure each scenario so many times, and show how far its figures spread
+    /// Judge nothing: measure each scenario N times, and show how far its figures spread
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     spread: Option<usize>,
-    /// Try the limits on ratios: plant a slow-down just above each, and fail if one goes unnoticed
-    #[arg(long = "try", conflicts_with = "spread")]
-    trial: bool,
     /// One line of JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -66,14 +62,7 @@ struct Arguments {
     callgrind: Option<PathBuf>,
 }
 
-fn at_least_one(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(0) | Err(_) => Err("give a whole number, 1 or more".to_owned()),
-        Ok(number) => Ok(number),
-    }
-}
-
-/// What the guard has found.
+/// The guard's results.
 #[derive(Debug, Serialize)]
 struct Findings {
     machine: String,
@@ -94,11 +83,11 @@ fn main() -> ExitCode {
     }
 }
 
-/// What is to be done.
+/// The guard's task.
 struct Guard {
     arguments: Arguments,
     limits: Limits,
-    /// The sources that have limits, in the file's order, or those of them that were asked for.
+    /// The sources that have limits, or the chosen ones, in the file's order.
     sources: Vec<String>,
 }
 
@@ -124,13 +113,10 @@ impl Guard {
         })
     }
 
-    /// Whether all is as it should be.
+    /// Measures and judges; returns whether every limit is kept.
     fn run(&self) -> Result<bool, GuardError> {
         if let Some(times) = self.arguments.spread {
             return self.spread(times).map(|()| true);
-        }
-        if self.arguments.trial {
-            return self.try_limits();
         }
         let findings = self.judge()?;
         match self.arguments.json {
@@ -176,7 +162,7 @@ impl Guard {
         Ok(findings)
     }
 
-    /// Shows how far the ratios that have limits spread from one measurement to the next.
+    /// Shows how far the limited ratios spread from one measurement to the next.
     fn spread(&self, times: usize) -> Result<(), GuardError> {
         head(["lowest", "median", "highest", "limit", "goal"], "");
         for scenario in self.scenarios() {
@@ -194,41 +180,14 @@ impl Guard {
         Ok(())
     }
 
-    /// Plants a slow-down just above each limit on a ratio; whether the guard has noticed each.
-    fn try_limits(&self) -> Result<bool, GuardError> {
-        let Arguments { limits, runs, .. } = &self.arguments;
-        let mut all_noticed = true;
-        if !self.arguments.json {
-            head(["limit", "before", "slower ns", "with it"], "noticed");
-        }
-        for scenario in self.scenarios() {
-            let (figures, _) = measure(&self.limits, scenario, *runs, 1)?;
-            for mut trial in trial::trials(&self.limits, &figures) {
-                trial::run(&mut trial, limits, &figures.source, *runs)?;
-                for planted in trial {
-                    all_noticed &= planted.noticed;
-                    if self.arguments.json {
-                        println!("{}", json(&planted));
-                        continue;
-                    }
-                    let (limit, before) = (Some(planted.limit), Some(planted.before));
-                    let cells = [limit, before, Some(planted.spin_ns as f64), planted.with];
-                    let noticed = if planted.noticed { "yes" } else { "NO" };
-                    line(planted.figure, cells.map(number), noticed);
-                }
-            }
-        }
-        Ok(all_noticed)
-    }
-
-    /// Those of the sources that are timed.
+    /// The sources that are timed.
     fn scenarios(&self) -> impl Iterator<Item = Scenario> {
         let scenario = |source: &String| Scenario::from_str(source, false).ok();
         self.sources.iter().filter_map(scenario)
     }
 }
 
-/// What the boards' images do; `benches/guard` runs this in the source tree.
+/// The cycles of the boards' images; `benches/guard` runs this in the source tree.
 fn chips() -> Result<ChipReport, GuardError> {
     let programs = chip::BAUDS.map(|baud| (baud, Programs::in_tree("".as_ref(), baud)));
     chip::measure(programs).map_err(GuardError::Chip)
@@ -257,19 +216,19 @@ fn print(findings: &Findings) {
     println!("\n{kept} of {judged} limits kept");
 }
 
-/// The machine, and the head of a table of figures.
+/// Prints the machine, and the head of a table of figures.
 fn head<const N: usize>(columns: [&str; N], last: &str) {
     println!("{}\n", machine::describe());
     line("figure", columns.map(str::to_owned), last);
 }
 
-/// A line of a table of figures.
+/// Prints a line of a table of figures.
 fn line<const N: usize>(figure: &str, cells: [String; N], last: &str) {
     let cells = cells.map(|cell| format!(" {cell:>9}")).concat();
     println!("{figure:<70}{cells}  {last}");
 }
 
-/// Ratios with two digits, counts as what they are.
+/// A ratio with two digits, or a count as a whole number.
 fn number(value: Option<f64>) -> String {
     match value {
         Some(value) if value.fract() == 0.0 && value >= 100.0 => format!("{value}"),

@@ -1,8 +1,8 @@
-//! Measures the figures that have limits, and measures again where a limit is broken.
+//! Measures the figures that have limits, and measures again if a limit is broken.
 //!
-//! **Why again:** other work on the machine comes and goes, and may meet most of three runs. What
-//! is measured again is put together with what was measured before, and the median of all runs
-//! counts. So a single lucky run does not hide code that is slower than its limit.
+//! **Why again:** other work on the machine comes and goes, and may disturb most of three runs. The
+//! median of all runs of all measurements counts, so one lucky run does not hide code that is
+//! slower than its limit.
 
 use lager_benches::{Options, Scenario, may_have_real_time};
 
@@ -11,8 +11,8 @@ use crate::figures::{Figures, RatioName};
 use crate::judge::judge;
 use crate::limits::Limits;
 
-/// Measures `scenario` until its limits are kept, at most `attempts` times; the figures, and how
-/// often it was measured.
+/// Measures `scenario` until its limits are kept, at most `attempts` times. Returns the figures and
+/// the number of measurements.
 pub(crate) fn measure(
     limits: &Limits,
     scenario: Scenario,
@@ -49,7 +49,7 @@ pub(crate) fn once(
     Ok(figures)
 }
 
-/// Only the modes and regimes that some limit is about: the rest would cost minutes.
+/// Only the modes and regimes that a limit needs: the others would take minutes.
 fn options(limits: &Limits, scenario: Scenario, runs: usize) -> Options {
     let source = scenario.to_string();
     let names: Vec<RatioName> = limits.of(&source).filter_map(|one| one.ratio()).collect();

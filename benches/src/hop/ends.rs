@@ -1,11 +1,14 @@
-//! What takes part in the hop: the sender times each sample's way, the receiver sends back what it
-//! receives. A row and what carries its samples stand in one table ([`ROWS`]).
+//! The two ends of the hop: the sender times each sample's way, and the receiver sends back what it
+//! receives. The table [`ROWS`] has each row with the carrier of its samples.
 
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_ports::{Bus, Clock, Policy};
-use lager_topics::{Qos, SensorLine, Stamp, Topic};
+use lager_home::Clock;
+use lager_ports::Bus;
+use lager_sample::{Qos, Stamp, Topic};
+use lager_topics::SensorLine;
+use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
 use crate::baseline::iceoryx::{self, Header, Member};
@@ -19,30 +22,30 @@ use crate::report::Mode;
 use crate::sample::{Ping, Pong, RECEIVER, SENDER, Sample};
 use crate::slow;
 
-/// From this line on a pipe for each of the two to write into: what to read from, what to write
-/// into.
+/// The first of the two lines with pipes. Each line has a pipe for one process to write into: the
+/// end to read from, and the end to write to.
 const PIPES: usize = 0;
-/// What each of the two rings.
+/// The eventfd that each of the two processes writes to.
 const EVENTFDS: usize = 2;
-/// The end of each of the two.
+/// The socket of each of the two processes.
 const UDS: usize = 3;
-/// The end of each of the two.
+/// The socket of each of the two processes.
 const TCP: usize = 4;
 
-/// What is measured in a round.
+/// The measurement of a round.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Job {
     /// The number of the row in [`ROWS`].
     pub(super) row: usize,
-    /// One way is timed by itself, from the sender's clock to the receiver's, with at least so long
-    /// from one sample to the next; zero is as fast as they come back. `None` = half of the round
-    /// trip is timed, as fast as samples come back: one clock, at one end; a tail shows by half.
+    /// `Some` = one way is timed, by the clock at both ends, with at least this time between
+    /// samples; zero is as fast as they come back. `None` = half of the round trip is timed by one
+    /// end's clock, as fast as samples come back; only half of a delay at one end shows.
     pub(super) gap: Option<Duration>,
 }
 
 type Round = pair::Round<Job>;
 
-/// What spinning rows are compared with.
+/// The baseline of spinning rows.
 pub(super) const HEADER: &str = "iceoryx2/header";
 const TO_HEADER: &[&str] = &[HEADER];
 const TO_EVENT: &[&str] = &["iceoryx2/event"];
@@ -55,11 +58,11 @@ const fn sleeps(label: &'static str, against: &'static [&'static str]) -> Entry 
     Entry::new(label, Mode::Block, against)
 }
 
-/// Exchanges the samples of a round.
+/// A function that exchanges the samples of a round.
 type Exchange = fn(&One) -> Result<Vec<u64>, BenchError>;
 
-/// Everything that takes part, in the order of the tables: what it is compared with, and what
-/// carries its samples.
+/// Every row, in the order of the tables: its label and its baselines, and the function that
+/// exchanges its samples.
 pub(super) const ROWS: &[(Entry, Exchange)] = &[
     // The typed ports.
     (
@@ -84,7 +87,7 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
         one.exchange(memory::cache_line(out, back))
     }),
     (Entry::new("lager", Mode::Adaptive, TO_HEADER), |one| {
-        // It is the receiver's wait that is timed.
+        // The receiver's wait is timed, so only the receiver adapts.
         one.ours(match one.side.is_first {
             true => Policy::Spin,
             false => Policy::ADAPTIVE,
@@ -119,27 +122,28 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
     #[cfg(feature = "zenoh")]
     (sleeps("zenoh", TO_EVENT), |one| {
         let folder = one.side.config.folder.as_deref().unwrap_or("".as_ref());
-        // A name of its own for each round: the one before may still be closing.
+        // Each round has its own name: the socket of the round before may still be closing.
         let socket = folder.join(format!("zenoh-{}", one.round.number));
         one.exchange(zenoh::meet(&socket, one.side.is_first, one.names())?)
     }),
 ];
 
-/// One round of one of the two, with ends of its own. The sender returns the times of one way each,
-/// in ns; where only one way is timed, it returns when it sent, and the receiver when it received.
+/// One round in one of the two processes, with ends of its own. The sender returns the times of one
+/// way, in ns. If only one way is timed, it returns when it sent, and the receiver when it
+/// received.
 pub(super) fn round(side: &Side, round: &Round) -> Result<Vec<u64>, BenchError> {
     let (_, exchange) = ROWS[round.what.row];
     exchange(&One { side, round })
 }
 
-/// One of the two in a round.
+/// One of the two processes in a round.
 pub(super) struct One<'a> {
     side: &'a Side,
     round: &'a Round,
 }
 
 impl One<'_> {
-    /// What there is of each of the two processes: its own, and the other's.
+    /// Of a pair, one for each process: first this process's, then the other's.
     fn own_first<T>(&self, [first, second]: [T; 2]) -> [T; 2] {
         match self.side.is_first {
             true => [first, second],
@@ -151,7 +155,7 @@ impl One<'_> {
         self.own_first(self.side.shared.lanes.0.each_ref())
     }
 
-    /// What bare iceoryx2 and Zenoh publish to, and what they subscribe to.
+    /// The names to which bare iceoryx2 and Zenoh publish and subscribe, in this order.
     fn names(&self) -> [&'static str; 2] {
         self.own_first(["bench/bare-ping", "bench/bare-pong"])
     }
@@ -176,7 +180,7 @@ impl One<'_> {
         self.exchange(stream::end(socket, socket))
     }
 
-    /// Keeps the end until the other process is done with its own.
+    /// Exchanges the samples, and keeps this end until the other process has finished too.
     fn exchange(&self, mut end: impl End) -> Result<Vec<u64>, BenchError> {
         self.side.together(self.round, || match self.side.is_first {
             true => self.send_and_time(&mut end),
@@ -234,8 +238,8 @@ impl One<'_> {
     }
 }
 
-/// The typed ports as an end that publishes to `Out` and waits for `Back`: publish, wait, receive,
-/// as every service does it.
+/// The typed ports as an end that publishes to `Out` and waits for `Back`: publish, wait and
+/// receive, as every service does.
 fn ours<Out, Back>(bus: &Bus, policy: Policy) -> Result<impl End + use<Out, Back>, BenchError>
 where
     Out: Topic<Payload = Sample>,
@@ -254,7 +258,7 @@ where
         let mut start = None;
         loop {
             waiter.wait(TIME_OUT);
-            // A sample may be found before its ring, which then ends the next wait for nothing.
+            // A sample may be found before its ring, which then ends the next wait too early.
             if waiter.has::<Back>()
                 && let Some(received) = subscriber.receive().map_err(broken)?
             {

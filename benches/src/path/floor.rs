@@ -1,4 +1,4 @@
-//! The floor: the same chain as the robot's, of the barest primitives the system has.
+//! The floor: the robot's chain, made of the simplest primitives of the system.
 //!
 //! ```text
 //!  sensor pty                                                       steering pty
@@ -7,18 +7,19 @@
 //! ```
 //!
 //! It has as many processes, threads, wake-ups and bytes as the robot, in the same places, on the
-//! same cores and in the same order of who goes first, but no packets, no decision and no bus. The
-//! time that a robot takes beyond this is its software's.
+//! same cores and with the same priorities, but no packets, no decision and no bus. So the robot's
+//! software causes the difference between the robot's time and the floor's.
 
 use std::error::Error;
 use std::os::fd::{OwnedFd, RawFd};
 use std::path::{Path, PathBuf};
 
-use lager_ports::{Clock, Policy, urgency};
+use lager_home::Clock;
 use lager_rig::process::Main;
-use lager_rig::schedule::Place;
+use lager_rig::schedule::Placement;
 use lager_rig::{Cable, Parent, Shared};
-use lager_topics::bytes_of;
+use lager_sample::bytes_of;
+use lager_wake::{Policy, urgency};
 use lager_wire::PACKET_LENGTH;
 use rustix::fs::{Mode as FileMode, OFlags};
 use rustix::io::Errno;
@@ -36,15 +37,15 @@ const MIDDLE: &str = "path, floor's middle";
 
 pub(crate) const PROCESSES: &[(&str, Main)] = &[(ENDS, ends), (MIDDLE, middle)];
 
-/// What carries a packet through shared memory; the rest of it is 0.
+/// A packet in shared memory; its unused bytes are 0.
 type Carrier = Block<2>;
 
-/// What a process of the floor is told: its place, the number of the lanes, and the serial ports.
-type Told = (Place, RawFd, [PathBuf; 2]);
+/// The parent's message: core and priority, the descriptor of the lanes, and the serial ports.
+type ChildSetup = (Placement, RawFd, [PathBuf; 2]);
 
-/// The serial ports and the lanes; the process has taken its place.
+/// Hears the serial ports and the lanes, and takes its core and priority.
 fn told(parent: &mut Parent) -> Result<([PathBuf; 2], Shared<Lanes<2>>), Box<dyn Error>> {
-    let (place, lanes, ports): Told = parent.told()?;
+    let (place, lanes, ports): ChildSetup = parent.told()?;
     place.take()?;
     Ok((ports, Shared::inherited(lanes)?))
 }
@@ -81,7 +82,7 @@ fn middle(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// A serial port whose `read` blocks, as one would open it without further needs.
+/// Opens a serial port in the simplest way: its `read` blocks.
 fn open(path: &Path) -> Result<OwnedFd, Errno> {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let port = rustix::fs::open(path, flags, FileMode::empty())?;
@@ -93,7 +94,7 @@ fn open(path: &Path) -> Result<OwnedFd, Errno> {
 
 /// The floor's chain with both its processes.
 pub(super) struct Floor {
-    // Before the lanes and the cables: the processes end first.
+    // The first field, so the processes end before the lanes and cables are dropped.
     processes: Processes,
     _lanes: Shared<Lanes<2>>,
     cables: [Cable; 2],
@@ -101,12 +102,12 @@ pub(super) struct Floor {
 }
 
 impl Floor {
-    /// Starts it; `ends` is where the bridge would be, `logic` where logic would be.
-    pub(super) fn start(ends: Place, logic: Place) -> Result<Self, BenchError> {
+    /// Starts the chain; `ends` is in the bridge's place, `logic` in logic's.
+    pub(super) fn start(ends: Placement, logic: Placement) -> Result<Self, BenchError> {
         let lanes = Shared::<Lanes<2>>::new()?;
         let cables = [Cable::new()?, Cable::new()?];
         let ports = cables.each_ref().map(|cable| cable.path().clone());
-        let told = |place| -> Told { (place, lanes.number(), ports.clone()) };
+        let told = |place| -> ChildSetup { (place, lanes.number(), ports.clone()) };
         let processes = Processes::start([(MIDDLE, told(logic)), (ENDS, told(ends))])?;
         Ok(Self {
             processes,

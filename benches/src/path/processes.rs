@@ -1,31 +1,31 @@
-//! The processes of one chain: put to sleep while others are measured, watched, and asked what
-//! processor time they used.
+//! The processes of one chain: stops them while other chains are measured, says why one of them
+//! failed, and counts their processor time.
 
 use core::time::Duration;
 
-use lager_ports::Clock;
-use lager_rig::{Process, ProcessError, told};
+use lager_home::Clock;
+use lager_rig::{Process, ProcessError, proc};
 use rustix::process::Signal;
 use serde::Serialize;
 
 use crate::error::{BenchError, Fault};
 
-/// How long an answer may take before the frame counts as lost and ends the measurement.
+/// The longest wait for an answer. After it the frame is lost and the measurement fails.
 pub(super) const ANSWER_WITHIN: Duration = Duration::from_secs(1);
 
 /// The processes of one chain.
 pub(super) struct Processes {
     processes: Vec<Process>,
-    /// Of these the processor time is counted: the services, not their observers.
+    /// The number of processes whose processor time counts: the services, not their observers.
     counted: usize,
-    /// Processor time and real time when the turn's counting began, in ns.
+    /// Processor time and real time at the start of the turn's counting, in ns.
     began: Option<(u64, u64)>,
     /// Processor time and real time of all turns so far, in ns.
     total: (u64, u64),
 }
 
 impl Processes {
-    /// Starts them, each with what it is told, one after the other; all are counted.
+    /// Starts them one after the other, each with its message. All of them count.
     pub(super) fn start<S: Serialize>(all: [(&str, S); 2]) -> Result<Self, BenchError> {
         let mut processes = Vec::new();
         for (name, setup) in all {
@@ -41,17 +41,17 @@ impl Processes {
         })
     }
 
-    /// More processes, which are not counted.
+    /// Adds processes that do not count.
     pub(super) fn add(&mut self, processes: Vec<Process>) {
         self.processes.extend(processes);
     }
 
-    /// Lets them run.
+    /// Lets the processes run again.
     pub(super) fn wake(&self) {
         self.signal(Signal::CONT);
     }
 
-    /// The turn is over: lets them stand still until [`Processes::wake`].
+    /// Ends the turn: stops the processes until [`Processes::wake`].
     pub(super) fn rest(&mut self) {
         if let Some((processor, real)) = self.began.take() {
             self.total.0 += self.processor_ns().saturating_sub(processor);
@@ -60,7 +60,7 @@ impl Processes {
         self.signal(Signal::STOP);
     }
 
-    /// From now on processor time is counted.
+    /// From now on processor time counts.
     pub(super) fn start_counting(&mut self) {
         self.began = Some((self.processor_ns(), Clock::monotonic_ns()));
     }
@@ -71,10 +71,10 @@ impl Processes {
         (real > 0).then(|| 100.0 * processor as f64 / real as f64)
     }
 
-    /// Why frame `number` has no answer: what a process says, that the kernel does not let it run,
-    /// or that it is silent.
+    /// Why frame `number` has no answer: a process reports an error, or a process is ready but gets
+    /// no core, or all are silent.
     pub(super) fn fault(&mut self, contender: &str, number: u64) -> BenchError {
-        let starved = self.counted().any(told::wants_to_run);
+        let starved = self.counted().any(proc::wants_to_run);
         for process in &mut self.processes {
             match process.hear_within::<()>(Duration::ZERO) {
                 Ok(()) | Err(ProcessError::Silent { .. }) => {}
@@ -101,8 +101,8 @@ impl Processes {
         self.processes[..self.counted].iter().map(Process::pid)
     }
 
-    /// Processor time of the counted processes, in ns.
+    /// The processor time of the counted processes, in ns.
     fn processor_ns(&self) -> u64 {
-        self.counted().map(told::processor_ns).sum()
+        self.counted().map(proc::processor_ns).sum()
     }
 }

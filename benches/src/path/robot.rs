@@ -1,7 +1,7 @@
-//! The chain under test: the real bridge and the real logic, each in a process of its own, between
+//! The measured chain: the real bridge and the real logic, each in a process of its own, between
 //! two boards that this file plays.
 //!
-//! Every frame makes one new order. Logic is told to trust a line frame for no time at all, so
+//! Every frame makes one new order, because logic trusts a line frame for less than 1 ms:
 //!
 //! ```text
 //!   sensor board sends        logic decides              steering board gets
@@ -9,18 +9,20 @@
 //!   Distance(255)      -->    I see nothing: stand   --> command 1, new seq
 //! ```
 //!
-//! by turns. A command answers a frame if it is the one that frame asks for and its seq is new;
-//! repetitions of the command in force carry the old one. On a machine that keeps logic from
-//! running for half a millisecond, logic may go blind right after it saw, and the bridge then
-//! writes the later of both orders alone. Such a frame counts with the time until that command was
-//! read, and how many they are is a row of its own (`path-overtaken`). The steering board reports
-//! that its wheels stand, so the robot drives towards its goods for as long as it is measured.
+//! The two kinds of frame take turns. A command answers a frame if it is the command in this table
+//! and its seq is new; repetitions of the command in force have the old seq. If the machine keeps
+//! logic from its core for half a millisecond, logic may stop trusting the line right after it saw
+//! it; then the bridge writes only the later of both orders. Such a frame counts with the time
+//! until that command was read, and has a row of its own (`path-overtaken`). The steering board
+//! reports that its wheels stand, so the robot drives towards its goods for as long as it is
+//! measured.
 
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_ports::{Bus, Clock};
-use lager_rig::schedule::{Place, RealTime};
+use lager_home::Clock;
+use lager_ports::Bus;
+use lager_rig::schedule::{Placement, RealTime};
 use lager_rig::{Board, Domain, Outset, Process, SPEAK_EVERY_NS, interrupted, wheels_in_the_air};
 use lager_topics::Role;
 use lager_wire::{Callsign, Centimetres, Command, LineState, Payload, WheelCommand};
@@ -30,68 +32,67 @@ use super::services::{BRIDGE, LOGIC, OBSERVER, Setup};
 use super::turn::{Chain, sleep_until_due};
 use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
-use crate::slow;
 
-/// How long the robot may take to come up, and to come back after it stood still.
+/// The longest time until the robot drives, at the start and after each pause.
 const UP_WITHIN: Duration = Duration::from_secs(10);
 
-/// Frames that must be answered one after the other before a robot counts as awake.
+/// The number of frames in a row with an answer, after which a robot counts as awake.
 const IN_A_ROW: usize = 5;
 
 const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
 
-/// What became of a frame.
-enum Answer {
-    /// The command it asks for was read so many ns after it was written.
+/// The reaction to a frame.
+enum Reaction {
+    /// The expected command was read this many ns after the frame was written.
     After(u64),
-    /// Another command came in its place, so many ns after it was written.
+    /// Another command was read instead, this many ns after the frame was written.
     Overtaken(u64),
-    /// Nothing new came in time.
+    /// No new command came in time.
     None,
 }
 
-/// The robot under test.
+/// The measured robot.
 pub(super) struct Robot {
-    /// While frames are counted, if the boards are to come before everything else. The first to
-    /// go: nobody tears down a robot before the rest of the machine may run.
+    /// The real time of the boards while frames count, if they have it. The first field: before the
+    /// robot is torn down, the rest of the machine may run again.
     urgent: Option<RealTime>,
     boards_priority: Option<u8>,
     name: &'static str,
-    // The processes end first and the bus's files go last.
+    // The processes end first, and the bus's files are removed last.
     processes: Processes,
     sensor: Board,
     steering: Board,
-    /// Code and seq of the last command that the steering board got.
+    /// Code and seq of the last command to the steering board.
     last: (u8, u8),
     frames: u64,
-    /// Frames count.
+    /// Whether frames count now.
     counts: bool,
-    /// The times of those that count and whose command was overtaken, in ns.
+    /// The times of the counted frames whose command was overtaken, in ns.
     overtaken: Vec<u64>,
     operator: Outset,
     _bus: Bus,
     _domain: Domain,
 }
 
-/// Where the processes of a robot run, and how urgent its boards are (SCHED_FIFO, while frames are
-/// counted: nobody who only looks on keeps them from reading the clock).
+/// The cores and priorities of a robot's processes, and its boards' SCHED_FIFO priority. The boards
+/// have it while frames count, so that no observer keeps them from reading the clock.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
-    pub(super) bridge: Place,
-    pub(super) logic: Place,
+    pub(super) bridge: Placement,
+    pub(super) logic: Placement,
     pub(super) boards: Option<u8>,
 }
 
 impl Robot {
-    /// Starts bridge and logic and lets them drive, watched by so many observers, each a process of
-    /// its own as `lager topic echo` would be.
+    /// Starts bridge, logic and `observers` observers, and lets the robot drive. Each observer is a
+    /// process of its own, as `lager topic echo` would be.
     pub(super) fn start(
         name: &'static str,
         mode: Mode,
         places: Places,
         observers: usize,
     ) -> Result<Self, BenchError> {
-        // Whether the boards may be as urgent.
+        // Fails if the boards may not have that priority.
         drop(places.boards.map(RealTime::begin).transpose()?);
         let domain = Domain::new(crate::FAMILY)?;
         let [sensor, steering] = [
@@ -99,7 +100,7 @@ impl Robot {
             Board::new(Callsign::Steering)?,
         ];
         let setup = Setup {
-            place: Place::default(),
+            place: Placement::default(),
             folder: domain.folder().to_owned(),
             mode,
             ports: [sensor.cable.path().clone(), steering.cable.path().clone()],
@@ -132,7 +133,7 @@ impl Robot {
             Ok::<Process, BenchError>(observer)
         };
         let mut observers = (0..observers).map(start).collect::<Result<Vec<_>, _>>()?;
-        // They start together; the last of them waits for the others' processor time.
+        // They start together. The last one waits until the others have had their processor time.
         for observer in &mut observers {
             let () = observer.hear_within(2 * UP_WITHIN)?;
         }
@@ -140,7 +141,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// From two silent boards, which are played slowly, to a robot on its way.
+    /// Plays both boards until the robot is on its way; at first both are silent.
     fn set_out(&mut self) -> Result<(), BenchError> {
         let start = Instant::now();
         while !self.operator.goes_on().map_err(no_bus)? {
@@ -152,7 +153,7 @@ impl Robot {
         Ok(())
     }
 
-    /// Whether nobody wants to stop, and there is time left of what was begun at `start`.
+    /// Fails if the user wants to stop, or if the time since `start` is over.
     fn check(&mut self, start: Instant) -> Result<(), BenchError> {
         if interrupted() {
             return Err(BenchError::Interrupted);
@@ -163,7 +164,7 @@ impl Robot {
         Ok(())
     }
 
-    /// All that the boards do beside sending frames.
+    /// Does everything that the boards do besides sending frames.
     fn play_boards(&mut self) -> Result<(), BenchError> {
         self.sensor.answer(|_| ())?;
         let last = &mut self.last;
@@ -173,13 +174,13 @@ impl Robot {
         self.report()
     }
 
-    /// Reports, if it is time: the wheels stand, and the board is one of ours.
+    /// Reports if a report is due: the wheels stand, and the board is one of this project.
     fn report(&mut self) -> Result<(), BenchError> {
         self.steering.speak(wheels_in_the_air(self.last.0))?;
         Ok(())
     }
 
-    /// Takes commands that nobody has asked for by a frame.
+    /// Reads commands that no frame has caused.
     fn drain_commands(&mut self) -> Result<(), BenchError> {
         let last = &mut self.last;
         self.steering.take(|payload| {
@@ -189,7 +190,7 @@ impl Robot {
     }
 
     /// Sends one frame when it is due, and waits at most `limit` for its answer.
-    fn exchange(&mut self, limit: Duration) -> Result<Answer, BenchError> {
+    fn exchange(&mut self, limit: Duration) -> Result<Reaction, BenchError> {
         sleep_until_due();
         self.drain_commands()?;
         self.frames += 1;
@@ -200,7 +201,7 @@ impl Robot {
             Payload::Line(LineState::OnLine)
         };
         let Some(packet) = self.sensor.link.encode(payload) else {
-            return Ok(Answer::None);
+            return Ok(Reaction::None);
         };
         let start = Clock::monotonic_ns();
         self.sensor.cable.write(&packet)?;
@@ -209,16 +210,13 @@ impl Robot {
         loop {
             let look = give_up.min(Clock::monotonic_ns() + SPEAK_EVERY_NS);
             let count = self.steering.cable.read_until(look, &mut buffer)?;
-            if count > 0 {
-                slow::answer();
-            }
             let end = Clock::monotonic_ns();
             if count == 0 && end >= give_up {
-                return Ok(Answer::None);
+                return Ok(Reaction::None);
             }
             if count == 0 {
-                // When the machine stood still, a report is late, and the robot stands until one
-                // comes. A board sends it whether it is answered or not.
+                // After the machine was held up, a report is late, and the robot stands until one
+                // comes. So the board reports while it waits, too.
                 self.report()?;
                 continue;
             }
@@ -228,16 +226,16 @@ impl Robot {
             });
             if let Some(code) = new {
                 return Ok(if (code == FOLLOW) == follows {
-                    Answer::Overtaken(end - start)
+                    Reaction::Overtaken(end - start)
                 } else {
-                    Answer::After(end - start)
+                    Reaction::After(end - start)
                 });
             }
         }
     }
 }
 
-/// Notes a command to the steering board; its code, if it is a new one.
+/// Keeps a command to the steering board in `last`; returns its code if its seq is new.
 fn note(last: &mut (u8, u8), payload: Payload) -> Option<u8> {
     let Payload::SteerCommand(command) = payload else {
         return None;
@@ -255,15 +253,15 @@ impl Chain for Robot {
     fn begin(&mut self) -> Result<(), BenchError> {
         let start = Instant::now();
         let mut in_a_row = 0;
-        // It may have stood still for longer than leases and links hold, and finds its way back by
-        // itself; or for nearly as long, and then the next report must not be late.
+        // If it was stopped for longer than leases and links hold, it comes up again by itself. If
+        // it was stopped for almost as long, the next report must come at once.
         self.steering.spoke_ns = 0;
         while in_a_row < IN_A_ROW {
             self.check(start)?;
             self.play_boards()?;
             in_a_row = match self.exchange(Duration::from_millis(20))? {
-                Answer::After(_) => in_a_row + 1,
-                Answer::Overtaken(_) | Answer::None => 0,
+                Reaction::After(_) => in_a_row + 1,
+                Reaction::Overtaken(_) | Reaction::None => 0,
             };
         }
         Ok(())
@@ -271,16 +269,16 @@ impl Chain for Robot {
 
     fn frame(&mut self) -> Result<u64, BenchError> {
         let time = match self.exchange(ANSWER_WITHIN)? {
-            Answer::After(time) => time,
-            Answer::Overtaken(time) => {
+            Reaction::After(time) => time,
+            Reaction::Overtaken(time) => {
                 if self.counts {
                     self.overtaken.push(time);
                 }
                 time
             }
-            Answer::None => return Err(self.processes.fault(self.name, self.frames)),
+            Reaction::None => return Err(self.processes.fault(self.name, self.frames)),
         };
-        // While the robot stands: a report is news to logic too, which then looks for the line.
+        // Only while the robot stands: logic gets the report too, and then looks for the line.
         if self.last.0 != FOLLOW {
             self.report()?;
         }

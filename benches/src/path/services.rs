@@ -1,7 +1,7 @@
-//! The processes of the path: the real bridge, the real logic, and those who watch them.
+//! The processes of the path: the real bridge, the real logic, and their observers.
 //!
-//! Each is the service's own `run` on a bus of the measurement's own, in a process of its own, as
-//! `lager up` starts it; nothing of a service is left out or put in.
+//! Each process runs the service's own `run`, as under `lager up`, on a bus of the measurement. The
+//! service is complete and unchanged.
 
 use core::time::Duration;
 use std::error::Error;
@@ -9,11 +9,12 @@ use std::path::PathBuf;
 
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
-use lager_ports::{Bus, Shutdown};
+use lager_ports::Bus;
 use lager_rig::process::Main;
-use lager_rig::schedule::Place;
+use lager_rig::schedule::Placement;
 use lager_rig::{Parent, bus_at};
 use lager_topics::{Role, SensorLine, SteeringCommand};
+use lager_wake::Shutdown;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{BenchError, no_bus};
@@ -28,13 +29,13 @@ pub(super) const OBSERVER: &str = "path, observer";
 pub(crate) const PROCESSES: &[(&str, Main)] =
     &[(BRIDGE, bridge), (LOGIC, logic), (OBSERVER, observer)];
 
-/// How often an observer looks: often enough for a person's eye.
+/// The period of an observer's looks: short enough for a person's eye.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// What a process of the path is told.
+/// The parent's message to a process of the path.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Setup {
-    pub(super) place: Place,
+    pub(super) place: Placement,
     pub(super) folder: PathBuf,
     /// How bridge and logic wait.
     pub(super) mode: Mode,
@@ -48,7 +49,7 @@ impl Setup {
     }
 }
 
-/// What the parent says, and the bus; a service has taken its place.
+/// Hears the parent's message, takes its core and priority, and opens the bus.
 fn told(parent: &mut Parent, role: Role) -> Result<(Setup, Bus), Box<dyn Error>> {
     let setup: Setup = parent.told()?;
     if role != Role::Observer {
@@ -66,15 +67,15 @@ fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         ..BridgeConfig::default()
     };
     parent.say(&())?;
-    // Ends with the process, which the parent ends.
+    // Runs until the parent ends the process.
     Ok(lager_bridge::run(&bus, &config, &Shutdown::new())?)
 }
 
 fn logic(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     let (setup, bus) = told(parent, Role::Logic)?;
     let config = LogicConfig {
-        // With it every frame makes a new order: a line frame lets the robot see and drive, any
-        // other frame, a millisecond later, finds the line long unseen and lets it stand.
+        // So every frame makes a new order: after a line frame the robot sees and drives. Any other
+        // frame comes 1 ms later, when the line was not seen for too long, and lets it stand.
         blind_after: Duration::from_micros(400),
         waiting: setup.mode.policy(),
         ..LogicConfig::default()
@@ -83,7 +84,7 @@ fn logic(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     Ok(lager_logic::run(&bus, &config, &Shutdown::new())?)
 }
 
-/// An observer: reads ten times a second all that has come, and is never woken.
+/// An observer: ten times a second it reads all that has come. Nobody wakes it.
 fn observer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     let (_, bus) = told(parent, Role::Observer)?;
     let mut line = bus.subscriber::<SensorLine>()?;

@@ -1,10 +1,10 @@
-//! One turn of a chain: its processes wake, answer frames and stand still again.
+//! One turn of a chain: its processes wake, answer frames and sleep again.
 //!
 //! Frames come at 1 kHz, always at the same phase of the millisecond and away from the kernel's
 //! timer tick, which comes on whole milliseconds. A chain that happened to meet the tick would look
 //! slower than one that did not.
 
-use lager_ports::Clock;
+use lager_home::Clock;
 use lager_rig::{interrupted, timespec};
 use rustix::thread::{ClockId, clock_nanosleep_absolute};
 
@@ -14,39 +14,39 @@ use crate::error::BenchError;
 /// Time between frames, in ns.
 const PERIOD: u64 = 1_000_000;
 
-/// Where in the millisecond a frame is sent, in ns.
+/// The time within each millisecond at which a frame is sent, in ns.
 const PHASE: u64 = 370_000;
 
-/// Frames of a turn that are sent and not counted: caches, learnt rates and clock frequencies are
-/// then as in the middle of a long run.
+/// Frames at the start of a turn that do not count. After them caches, learnt rates and clock
+/// frequencies are as in the middle of a long run.
 const WARM_UP: usize = 50;
 
-/// Frames of a turn that count. Few, so that what the machine does meanwhile meets all chains.
+/// Frames of a turn that count. They are few, so that a disturbance hits all chains.
 pub(super) const TURN: usize = 250;
 
-/// A chain that frames can be sent through.
+/// A chain that answers frames.
 pub(super) trait Chain {
-    /// Its processes, which stand still while others are measured.
+    /// The chain's processes, which are stopped while other chains are measured.
     fn processes(&mut self) -> &mut Processes;
-    /// Sends one frame when it is due; the time until its answer was read, in ns.
+    /// Sends one frame when it is due; returns the time until its answer was read, in ns.
     fn frame(&mut self) -> Result<u64, BenchError>;
-    /// Makes sure that it answers, after it stood still.
+    /// Waits until the chain answers again after a pause.
     fn begin(&mut self) -> Result<(), BenchError> {
         Ok(())
     }
-    /// From now on, or until now, frames count.
+    /// Frames count from now on, or do not count any more.
     fn counts(&mut self, _counts: bool) -> Result<(), BenchError> {
         Ok(())
     }
-    /// The times of the frames that counted and whose command was overtaken by another one, in ns;
-    /// `None` of a chain where none can be.
+    /// The times of the counted frames whose command was overtaken by another one, in ns; `None` if
+    /// the chain cannot overtake.
     fn overtaken(&self) -> Option<&[u64]> {
         None
     }
 }
 
-/// One turn of `chain`: wakes it, warms it up, sends `frames` frames that count, puts it to sleep.
-/// The times of the frames that count, in ns.
+/// One turn of `chain`: wakes it, warms it up, sends `frames` frames that count, and stops it.
+/// Returns their times in ns.
 pub(super) fn turn(chain: &mut dyn Chain, frames: usize) -> Result<Vec<u64>, BenchError> {
     chain.processes().wake();
     chain.begin()?;
@@ -67,7 +67,7 @@ pub(super) fn turn(chain: &mut dyn Chain, frames: usize) -> Result<Vec<u64>, Ben
     Ok(times)
 }
 
-/// Sleeps until a frame is due.
+/// Sleeps until the next frame is due.
 pub(super) fn sleep_until_due() {
     let due = next_due(Clock::monotonic_ns());
     while clock_nanosleep_absolute(ClockId::Monotonic, &timespec(due)).is_err() {
@@ -77,8 +77,8 @@ pub(super) fn sleep_until_due() {
     }
 }
 
-/// The first moment of the right phase that is at least a quarter of a period away, so that no
-/// frame is sent by one who has not slept.
+/// The first moment of the right phase that is at least a quarter of a period away, so that the
+/// thread always sleeps before it sends.
 fn next_due(now: u64) -> u64 {
     let earliest = now + PERIOD / 4;
     let due = earliest - earliest % PERIOD + PHASE;

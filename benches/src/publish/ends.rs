@@ -1,11 +1,14 @@
-//! Both processes: the writer publishes or rings when all readers are ready, and is timed
-//! meanwhile; the readers wait for each sample or ring, and drain their queues.
+//! Both processes of `publish`. The writer publishes or rings when all readers are ready, and is
+//! timed. The readers wait for each sample or ring, and empty their queues.
 
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_ports::{Bus, Clock, Policy, Subscriber};
-use lager_topics::{OBSERVERS, Qos, Role, SensorLine, Stamp, Topic};
+use lager_home::Clock;
+use lager_ports::{Bus, Subscriber};
+use lager_sample::{Qos, Stamp, Topic};
+use lager_topics::{Role, SensorLine};
+use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
 use crate::baseline::iceoryx::Member;
@@ -15,30 +18,30 @@ use crate::pair::{self, Side};
 use crate::sample::{Block, Ping, RECEIVER, SENDER, Sample, drain};
 use crate::slow;
 
-/// Sizes of a block, in words of eight bytes.
+/// Sizes of a block, in words of 8 bytes.
 pub(super) const SMALL: usize = 8;
 pub(super) const KIB_64: usize = 1 << 13;
 pub(super) const MIB_1: usize = 1 << 17;
 
-/// What is measured in a round.
+/// The measurement of a round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Job {
-    /// Our ports publish blocks of so many words to so many readers.
+    /// The typed ports publish blocks of `words` words to `readers` readers.
     Lager { words: usize, readers: usize },
     /// The same with bare iceoryx2 and the same user header.
     Iceoryx2 { words: usize, readers: usize },
-    /// Our ports ring an actor: what it takes longer to publish where it waits for that.
+    /// The typed ports ring an actor: the longer time of a publish for which the actor waits.
     Ring,
-    /// Bare iceoryx2 notifies so many listeners.
+    /// Bare iceoryx2 notifies `listeners` listeners.
     Notify { listeners: usize },
 }
 
 type Round = pair::Round<Job>;
 
-/// What the writer's samples took, in ns; the readers have nothing to tell.
+/// The times of the writer's samples, in ns; the readers return none.
 type Times = Result<Vec<u64>, BenchError>;
 
-/// One round of one of the two.
+/// One round in one of the two processes.
 pub(super) fn round(side: &Side, round: &Round) -> Times {
     match round.what {
         Job::Lager { words, readers } => match words {
@@ -56,8 +59,8 @@ pub(super) fn round(side: &Side, round: &Round) -> Times {
     }
 }
 
-/// The topic of blocks of that size. Small ones have `sensor/line`'s depth; large ones the least
-/// there is, since a publisher keeps memory for every place that a subscriber could fill.
+/// The topic of blocks of that size. Small ones have `sensor/line`'s depth. Large ones have depth
+/// 1, because a publisher keeps memory for every sample that could lie in a subscriber's queue.
 struct Fan<const WORDS: usize>;
 
 impl<const WORDS: usize> Topic for Fan<WORDS> {
@@ -111,13 +114,13 @@ fn iceoryx2<const WORDS: usize>(side: &Side, round: &Round, readers: usize) -> T
     }
 }
 
-/// The readers wait for this, and do not look into their queues meanwhile.
+/// Tells the readers the sample's number, for which they wait without a look at their queues.
 fn tell<const WORDS: usize>(side: &Side, block: &Block<WORDS>) -> Result<(), Fault> {
     side.shared.published.set(block.number());
     Ok(())
 }
 
-/// Lets every reader receive each sample when it is published.
+/// For each sample, waits until it is published and lets every reader receive it.
 fn each_receives<R>(
     side: &Side,
     round: &Round,
@@ -138,7 +141,7 @@ fn each_receives<R>(
 }
 
 fn ring(side: &Side, round: &Round) -> Times {
-    // Where the actor sleeps while it does not wait for a ring.
+    // The word on which the actor sleeps when it does not wait for a ring.
     let elsewhere = &side.shared.lanes.0[0].word;
     if side.is_first {
         let bus = side.bus(SENDER)?;
@@ -147,7 +150,7 @@ fn ring(side: &Side, round: &Round) -> Times {
             let mut loan = publisher.loan().map_err(broken)?;
             *loan = *sample;
             if rings(sample.number()) {
-                slow::publish(OBSERVERS);
+                slow::publish(SensorLine::QOS.observers);
             }
             loan.send().map_err(broken)
         };
@@ -162,7 +165,7 @@ fn ring(side: &Side, round: &Round) -> Times {
         let (actor, observer) = (side.bus(RECEIVER)?, side.bus(Role::Observer)?);
         let mut acting = actor.subscriber::<Ping>().map_err(no_bus)?;
         let waiter = actor.waiter(Policy::Block).map_err(no_bus)?;
-        let mut observing = subscribers::<Ping>(&observer, OBSERVERS)?;
+        let mut observing = subscribers::<Ping>(&observer, SensorLine::QOS.observers)?;
         let mut heard = elsewhere.count();
         let is_rung = |number| {
             if rings(number) {
@@ -180,7 +183,7 @@ fn ring(side: &Side, round: &Round) -> Times {
 
 fn notify(side: &Side, round: &Round, listeners: usize) -> Times {
     let member = Member::join(&side.config, Some(Ping::QOS))?;
-    // A service keeps its number of listeners.
+    // A service keeps its number of listeners for ever, so each number has a service.
     let name = format!("bench/bare-ring-{listeners}");
     if side.is_first {
         let notifier = member.notifier(&name, listeners)?;
@@ -220,14 +223,14 @@ fn rings(number: u64) -> bool {
     !number.is_multiple_of(2)
 }
 
-/// Publishes each sample of a round when the readers are ready for it; how long each took, in ns.
+/// Publishes each sample of a round when the readers are ready; returns the times in ns.
 fn timed<const WORDS: usize>(
     side: &Side,
     round: &Round,
     mut publish: impl FnMut(&Block<WORDS>) -> Result<(), Fault>,
     mut follow_up: impl FnMut(&Block<WORDS>) -> Result<(), Fault>,
 ) -> Times {
-    // An actor that is rung surely sleeps by then.
+    // After this pause the actor surely sleeps when it is rung.
     let pause = match round.what {
         Job::Ring | Job::Notify { .. } => Duration::from_micros(60),
         Job::Lager { .. } | Job::Iceoryx2 { .. } => Duration::ZERO,
@@ -240,7 +243,7 @@ fn timed<const WORDS: usize>(
             side.wait(&side.shared.ready, number).map_err(failed)?;
             let ready = Instant::now();
             while ready.elapsed() < pause {
-                // It may be on this core.
+                // The actor may need this core.
                 rustix::thread::sched_yield();
             }
             block.words[0] = number;
@@ -253,7 +256,7 @@ fn timed<const WORDS: usize>(
     })
 }
 
-/// For each sample of a round: tells the writer that all are ready, waits, and drains.
+/// For each sample of a round: tells the writer that all readers are ready, waits, and drains.
 fn in_turns(
     side: &Side,
     round: &Round,
@@ -271,7 +274,7 @@ fn in_turns(
     })
 }
 
-/// Waits as the actor, until it is rung.
+/// Waits as the actor until the ring comes.
 fn until(
     mut is_rung: impl FnMut(u64) -> Result<bool, Fault>,
 ) -> impl FnMut(u64) -> Result<(), Fault> {

@@ -1,18 +1,18 @@
-//! The door of a web server: how many may ask at once, and for how long. The panel and the figures
-//! for Prometheus stand behind one each.
+//! [`Door`]: how many clients may be connected to a web server at once, and for how long. The panel
+//! and the gateway have one each.
 //!
-//! Somebody who connects and says nothing, or his request a byte at a time, must not keep others
-//! out, and must not use up this process's open files:
+//! A client that connects and sends nothing, or one byte at a time, must not keep others out, and
+//! must not use up this process's open files:
 //!
-//! - There is room for [`Limits::most`] connections. Where all of it is taken, whoever comes gets
-//!   the place of another (`room`): of one that has not been admitted, at the address that has most
-//!   of them, the one that came first.
-//! - A connection ends when it has not asked a whole question within [`ASKS`] of its beginning, and
-//!   in any case after [`STAYS`], unless it has been allowed to stay.
-//! - Where the system has no file to open for whoever comes, he waits in the system's queue; that
-//!   is said once a minute.
+//! - There is room for [`Limits::most`] connections. When the room is full, a new client takes the
+//!   place of another client (`room`): of one that the server has not admitted. If there are
+//!   several, the door takes the oldest one at the address that has most of them.
+//! - A connection ends if it has not sent a whole request within [`ASKS`]. It ends after [`STAYS`]
+//!   in any case, unless the server lets it stay.
+//! - When the system has no open file left, new clients wait in the system's queue, and the door
+//!   says so once a minute.
 //!
-//! It knows nothing of what is asked.
+//! The door does not read the requests.
 
 #![forbid(unsafe_code)]
 
@@ -37,21 +37,21 @@ use tokio::time::{Instant, Sleep, sleep, sleep_until};
 
 use room::Room;
 
-/// How long a connection may be there before it has asked a whole question.
+/// How long a connection may take for its first whole request.
 pub const ASKS: Duration = Duration::from_secs(3);
-/// How long it may be there in all, unless it is allowed to stay.
+/// How long a connection may last, unless the server lets it stay.
 pub const STAYS: Duration = Duration::from_secs(10);
-/// How long nobody is let in after the system had no file to open for him.
+/// How long the door lets nobody in after the system had no open file left.
 const REST: Duration = Duration::from_millis(250);
-/// When that is said again, if it is still so.
+/// How often the door reports this, while it lasts.
 const AGAIN: Duration = Duration::from_secs(60);
 
-/// What may come through one door.
+/// The limits of one door.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Connections at a time.
+    /// The most connections at a time.
     pub most: usize,
-    /// What stands behind it, as the subject of a sentence.
+    /// Name of the server behind the door, as the subject of a sentence.
     pub whose: &'static str,
 }
 
@@ -61,7 +61,7 @@ pub struct Door {
     listener: TcpListener,
     limits: Limits,
     room: Arc<Mutex<Room<oneshot::Sender<()>>>>,
-    /// When it was said last that nobody is let in.
+    /// When the door last reported that it lets nobody in.
     told: Option<Instant>,
 }
 
@@ -76,7 +76,7 @@ impl Door {
         }
     }
 
-    /// Lets one in, in the place of another if there is no other.
+    /// Lets one client in, if need be in the place of another.
     fn let_in(&self, stream: TcpStream, from: IpAddr) -> Option<(Guest, Visitor)> {
         let visitor = Visitor::default();
         let (leaves, over) = oneshot::channel();
@@ -90,7 +90,7 @@ impl Door {
             began,
             ends: Box::pin(sleep_until(began + ASKS)),
             over,
-            _place: Place {
+            _seat: Seat {
                 room: Arc::clone(&self.room),
                 number,
             },
@@ -112,7 +112,7 @@ impl Listener for Door {
                     }
                 }
                 Err(error) if is_short(&error) => {
-                    // To ask for him at once would be in vain.
+                    // To accept again at once would fail again.
                     if self.told.is_none_or(|told| told.elapsed() >= AGAIN) {
                         self.told = Some(Instant::now());
                         tracing::warn!(
@@ -123,7 +123,7 @@ impl Listener for Door {
                     }
                     sleep(REST).await;
                 }
-                // It was gone before it was let in.
+                // The client was gone before it was let in.
                 Err(error) => tracing::debug!("a connection failed: {error}"),
             }
         }
@@ -146,33 +146,33 @@ fn lock<T>(room: &Mutex<Room<T>>) -> MutexGuard<'_, Room<T>> {
     room.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Who is at the other end of a connection, as far as whoever answers it has found out. It takes
-/// the place of the address, which nobody asks for.
+/// The client of a connection, with what the server knows about it. axum gives this to the server
+/// in place of the client's address.
 #[derive(Clone, Debug, Default)]
 pub struct Visitor(Arc<AtomicU8>);
 
-/// What is known of him, from least to most; 0 is nothing.
+/// How much is known of a client, from least to most; 0 is nothing.
 mod known {
-    /// He has asked a whole question.
+    /// The client has sent a whole request.
     pub(crate) const ASKED: u8 = 1;
-    /// He is one of those for whom this is here.
+    /// The server is meant for this client.
     pub(crate) const ADMITTED: u8 = 2;
-    /// He may stay for as long as he likes.
+    /// The client may stay for any time.
     pub(crate) const STAYS: u8 = 3;
 }
 
 impl Visitor {
-    /// He has asked a whole question.
+    /// To be called when the client has sent a whole request.
     pub fn has_asked(&self) {
         self.0.fetch_max(known::ASKED, Ordering::Relaxed);
     }
 
-    /// He is one of those for whom this is here, so others go before him where room is needed.
+    /// To be called when the server is meant for this client, so that others make room before it.
     pub fn admit(&self) {
         self.0.fetch_max(known::ADMITTED, Ordering::Relaxed);
     }
 
-    /// He may stay; whoever says so has limits of his own for him.
+    /// Lets the client stay. The caller must limit it in another way.
     pub fn let_stay(&self) {
         self.0.fetch_max(known::STAYS, Ordering::Relaxed);
     }
@@ -188,14 +188,14 @@ impl Connected<IncomingStream<'_, Door>> for Visitor {
     }
 }
 
-/// A place in the room; it is free again when this is dropped.
+/// A place in the room; dropping it frees the place.
 #[derive(Debug)]
-struct Place {
+struct Seat {
     room: Arc<Mutex<Room<oneshot::Sender<()>>>>,
     number: u64,
 }
 
-impl Drop for Place {
+impl Drop for Seat {
     fn drop(&mut self) {
         lock(&self.room).goes(self.number);
     }
@@ -208,13 +208,13 @@ pub struct Guest {
     visitor: Visitor,
     began: Instant,
     ends: Pin<Box<Sleep>>,
-    /// Told when somebody else gets its place.
+    /// Reports that another client gets this place.
     over: oneshot::Receiver<()>,
-    _place: Place,
+    _seat: Seat,
 }
 
 impl Guest {
-    /// Fails when its time is over, or its place is somebody else's.
+    /// Fails when the connection's time is over, or another client has its place.
     fn look(&mut self, context: &mut Context<'_>) -> io::Result<()> {
         if Pin::new(&mut self.over).poll(context).is_ready() {
             return Err(io::ErrorKind::ConnectionAborted.into());

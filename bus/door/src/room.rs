@@ -1,11 +1,11 @@
-//! Who is in, and who goes when another one comes. Pure.
+//! [`Room`]: which clients are in, and which one must leave when another comes. It does no I/O.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 
 use crate::{Visitor, known};
 
-/// The places behind a door; each has something by which its guest is sent away.
+/// The places behind a door. Dropping a place's `T` tells its client to leave.
 #[derive(Debug)]
 pub(crate) struct Room<T> {
     most: usize,
@@ -29,8 +29,8 @@ impl<T> Room<T> {
         }
     }
 
-    /// One more comes, in the place of another if all are taken; `None` where all may stay. Who has
-    /// to go finds the other end of what is dropped here.
+    /// One more client comes, in the place of another if all are taken. `None` if all may stay. The
+    /// client that must leave notices that its `leaves` is dropped.
     pub(crate) fn comes(&mut self, from: IpAddr, visitor: Visitor, leaves: T) -> Option<u64> {
         if self.guests.len() >= self.most {
             let goes = self.first_to_go()?;
@@ -47,13 +47,13 @@ impl<T> Room<T> {
         Some(number)
     }
 
-    /// One has gone.
+    /// A client has left.
     pub(crate) fn goes(&mut self, number: u64) {
         self.guests.remove(&number);
     }
 
-    /// Of those that have not been admitted, or else of those that may not stay, the first at the
-    /// address that has most of them.
+    /// The client that must leave: of those not admitted, or else of those that may not stay, the
+    /// first one at the address that has most of them.
     fn first_to_go(&self) -> Option<u64> {
         self.first_below(known::ADMITTED)
             .or_else(|| self.first_below(known::STAYS))
@@ -78,7 +78,7 @@ mod tests {
 
     use super::*;
 
-    /// Comes and says whether each of those before it is still in.
+    /// A client comes; returns whether each of those before it is still in.
     fn is_in<T>(room: &Room<T>, number: u64) -> bool {
         room.guests.contains_key(&number)
     }

@@ -1,27 +1,27 @@
 //! Whether a machine's calendar can be believed, and when it was set.
 //!
-//! A Pi has no clock that runs without power. It starts in 1970, or where it was switched off, and
-//! its calendar is set when it finds a network, or never. Stamps are of `CLOCK_MONOTONIC`, which
-//! nobody sets, so a recording's durations are true all the same. What it says of dates goes by the
-//! offset between both clocks when it began. So a [`Calendar`] watches that offset, and a change of
-//! it is noted in the file ([`Step`]).
+//! A Pi has no clock that runs without power. Its calendar starts in 1970, or at the time when it
+//! was switched off. The Pi sets it when it finds a network, or never. Stamps come from
+//! `CLOCK_MONOTONIC`, which nobody sets, so a recording's durations are right in any case. Its
+//! dates follow from the difference between both clocks when it began. So a [`Calendar`] watches
+//! this difference, and the file notes each change of it ([`Step`]).
 
 use std::collections::BTreeMap;
 
 /// The metadata record that says that the calendar was set.
 pub(crate) const NAME: &str = "lager.calendar";
-/// So many of these records are read at most.
+/// A reader reads at most so many of these records.
 pub(crate) const MOST: usize = 100;
 
 /// 2024-01-01, before which no program of this project ran, in ns since 1970.
 const FIRST_NS: u64 = 1_704_067_200_000_000_000;
 /// 2262-04-11, where a signed number of ns ends.
 const LAST_NS: u64 = i64::MAX as u64;
-/// A smaller change of the offset is no setting of the calendar: it is corrected while it runs, and
-/// both clocks cannot be read at one moment.
+/// A smaller change of the offset does not count as a setting of the calendar: the system corrects
+/// the calendar while it runs, and nobody can read both clocks at the same moment.
 const SMALL_NS: u64 = 250_000_000;
 
-/// Whether no machine whose calendar is set says that it is this moment, in ns since 1970.
+/// Whether a date in ns since 1970 lies outside the years in which a set calendar can be.
 pub const fn is_doubtful(unix_ns: u64) -> bool {
     unix_ns < FIRST_NS || unix_ns >= LAST_NS
 }
@@ -29,7 +29,7 @@ pub const fn is_doubtful(unix_ns: u64) -> bool {
 /// A moment at which the calendar was set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// When, by the dates of the recording, which go on as they began: in ns since 1970.
+    /// When, in ns since 1970, by the dates of the recording. They go on as they began.
     pub at_ns: u64,
     /// What is added to the recording's dates to get those of the new calendar, in ns.
     pub by_ns: i64,
@@ -45,7 +45,7 @@ impl Step {
         .into()
     }
 
-    /// The step that the metadata record `name` tells of.
+    /// The step that the metadata record `name` describes.
     pub(crate) fn of_note(name: &str, texts: &BTreeMap<String, String>) -> Option<Self> {
         let text = |of: &str| texts.get(of).filter(|_| name == NAME);
         Some(Self {
@@ -65,12 +65,13 @@ impl Step {
 pub struct Calendar {
     /// The offset by which the recording's dates go.
     began_ns: i64,
-    /// The offset as it was seen last.
+    /// The last offset.
     seen_ns: i64,
 }
 
 impl Calendar {
-    /// For a recording that begins with this offset from the stamps' clock to ns since 1970.
+    /// For a recording that begins with this difference between ns since 1970 and the stamps'
+    /// clock.
     pub const fn new(offset_ns: i64) -> Self {
         Self {
             began_ns: offset_ns,
@@ -78,7 +79,7 @@ impl Calendar {
         }
     }
 
-    /// Whether the calendar has been set since it was looked at: the offset is `offset_ns` at
+    /// Whether somebody has set the calendar since the last call. The offset is `offset_ns` at
     /// `stamp_ns` of the stamps' clock.
     pub fn look(&mut self, stamp_ns: u64, offset_ns: i64) -> Option<Step> {
         if offset_ns.abs_diff(self.seen_ns) < SMALL_NS {

@@ -1,9 +1,9 @@
-//! Whether a file is what its writer wrote: every CRC, every number, and its own sums.
+//! Checks that a file is undamaged: every CRC, every sample's number, and the file's own counts.
 //!
-//! Each topic's numbers must rise within each stream, and no more of them may be skipped than the
-//! file says were lost or dropped. That is exact in one direction only: of a stream that began
-//! before the recording nobody knows what came before its first sample. A sample that is repeated
-//! from an earlier file is only read: its number is counted there.
+//! Each topic's numbers must rise within each stream. No more of them may be missing than the file
+//! says were lost or dropped. This finds too many missing numbers, not too few: if a stream began
+//! before the recording, nobody knows its earlier samples. A sample that is repeated from an
+//! earlier file counts only there.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
@@ -18,26 +18,26 @@ use crate::numbers::Numbers;
 use crate::walk::{Damage, Message, Visit};
 use crate::write::{RECORDING, Start};
 
-/// So many faults are kept; a file with more of them is not worth reading.
+/// At most so many faults are kept. A file with more is not worth reading.
 const MOST: usize = 100;
 
 /// What is wrong with a file.
 #[derive(Debug)]
 pub enum Fault {
-    /// Its bytes are not what was written.
+    /// Its bytes have changed since they were written.
     Damage(Damage),
-    /// Messages that the index counts are not there, or others are.
+    /// The index counts other messages than the file has.
     Statistics {
         /// The topic.
         topic: String,
-        /// Messages as the index has it.
+        /// How many messages the index counts.
         told: u64,
-        /// Messages that are there.
+        /// How many messages the file has.
         there: u64,
     },
-    /// The index leads to chunks that are not there, or not to all that are.
+    /// The index names chunks that do not exist, or does not name all.
     Index {
-        /// How many chunks are meant by only one of both.
+        /// How many chunks only the index or only the file has.
         chunks: usize,
     },
     /// A message is not JSON as the recorder writes it.
@@ -47,13 +47,13 @@ pub enum Fault {
         /// Why it cannot be read.
         why: String,
     },
-    /// A sample's number is not above the one before it.
+    /// A sample's number is not greater than the one before it.
     Backwards {
         /// The topic.
         topic: String,
         /// The number.
         number: u64,
-        /// The number that could come at the earliest.
+        /// The smallest number that could follow.
         expected: u64,
     },
     /// More samples are missing than the file says.
@@ -65,7 +65,7 @@ pub enum Fault {
         /// Samples that the file says were lost or dropped.
         told: u64,
     },
-    /// It does not say what was lost.
+    /// The file does not say how many samples were lost.
     NoCounts,
 }
 
@@ -81,7 +81,7 @@ impl fmt::Display for Fault {
                 write!(formatter, "the index is wrong about {chunks} chunks")
             }
             Self::Message { topic, why } => {
-                write!(formatter, "{topic}: a message is not readable: {why}")
+                write!(formatter, "{topic}: a message cannot be read: {why}")
             }
             Self::Backwards {
                 topic,
@@ -100,23 +100,24 @@ impl fmt::Display for Fault {
     }
 }
 
-/// What was found of one topic.
+/// What the check found of one topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TopicReport {
     /// Messages that are there.
     pub messages: u64,
-    /// Those of them that were sent before the file began, and stand in an earlier one as well.
+    /// How many of them are repeated from an earlier file.
     pub repeated: u64,
     /// Numbers that were skipped between them.
     pub gaps: u64,
-    /// What the file says.
+    /// How many the file says are missing.
     pub count: Option<Count>,
 }
 
 /// What was found.
 #[derive(Debug, Default)]
 pub struct Report {
-    /// Whether `lager bag record` or `recover` wrote the file; numbers of others are not looked at.
+    /// Whether `lager bag record` or `recover` wrote the file. The check reads no numbers of
+    /// others.
     pub is_ours: bool,
     /// By topic.
     pub topics: BTreeMap<String, TopicReport>,
@@ -128,9 +129,9 @@ pub struct Report {
     pub begin_ns: u64,
     /// When the machine's calendar was set meanwhile.
     pub steps: Vec<Step>,
-    /// What is wrong, as far as it was kept.
+    /// The faults, at most so many as are kept.
     pub faults: Vec<Fault>,
-    /// How much is wrong.
+    /// How many faults there are.
     pub faults_found: u64,
 }
 
@@ -151,12 +152,12 @@ pub struct Check {
 }
 
 impl Check {
-    /// Of which robot the file is.
+    /// The robot that the file is of.
     pub fn start(&self) -> Option<&Start> {
         self.start.as_ref()
     }
 
-    /// What was found, when the walk is over.
+    /// The result, when the walk is over.
     pub fn finish(mut self) -> Report {
         for (name, numbers) in std::mem::take(&mut self.numbers) {
             let count = self.counts.as_ref().and_then(|counts| counts.get(&name));
@@ -184,8 +185,8 @@ impl Check {
         self.report
     }
 
-    /// An index that was not reached is not compared. Each of its records is optional, and so are
-    /// the counts of the channels in it: what it does not say is not wrong.
+    /// Compares the index, if the walk reached it. Each of its records is optional, and so is each
+    /// count of a channel, so a missing one is no fault.
     fn compare_with_index(&mut self) {
         if let Some(statistics) = self.statistics.take() {
             let mut told = statistics.channel_message_counts;

@@ -1,4 +1,5 @@
-//! How many samples of each topic a file has and lacks, as the metadata record `lager.counts`.
+//! The metadata record `lager.counts`: how many samples of each topic a file has, and how many are
+//! missing.
 
 use std::collections::BTreeMap;
 
@@ -7,19 +8,19 @@ use serde::{Deserialize, Serialize};
 /// The record's name.
 pub(crate) const NAME: &str = "lager.counts";
 
-/// What became of the samples of one topic that were sent while a file was recorded.
+/// What happened to the samples of one topic while a file was recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Count {
     /// Samples that reached the recorder.
     pub received: u64,
-    /// Samples that were overwritten before the recorder looked, by the gaps in their numbers.
+    /// Samples that were overwritten before the recorder read them, as gaps in the numbers show.
     pub lost: u64,
     /// Samples that reached the recorder and are not in the file, because its queue was full.
     pub dropped: u64,
 }
 
 impl Count {
-    /// Samples that the file should have and does not.
+    /// Samples that the file should have and does not have.
     pub const fn missing(&self) -> u64 {
         self.lost.saturating_add(self.dropped)
     }
@@ -37,7 +38,7 @@ pub(crate) fn to_texts(counts: &Counts) -> BTreeMap<String, String> {
     texts.collect()
 }
 
-/// A topic whose text is not readable is left out.
+/// Leaves out a topic whose text cannot be read.
 pub(crate) fn of_texts(texts: &BTreeMap<String, String>) -> Counts {
     let counts = texts.iter().filter_map(|(topic, text)| {
         let count = serde_json::from_str(text).ok()?;

@@ -1,4 +1,4 @@
-//! A moment as people write it, without a library of calendars.
+//! A moment as people write it. It needs no library of calendars.
 
 /// A moment in ns since 1970 as `2026-11-23 15:49:06.123`, in UTC.
 pub fn utc(unix_ns: u64) -> String {

@@ -1,9 +1,9 @@
-//! One message: a sample's stamp and payload, and what its topic lacks before it.
+//! One message: a sample's stamp and payload, and how many samples are missing before it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lager_topics::{Description, Field, Stamp, describe};
+use lager_sample::{Description, Field, Stamp, describe};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -30,8 +30,8 @@ pub struct EnvelopeSchema {
 }
 
 impl EnvelopeSchema {
-    /// Of a topic whose payload is laid out like this. The layout itself stands in its comment, by
-    /// which a program makes payloads of a topic that it was not built with.
+    /// The schema of a payload with this layout. The schema's comment has the layout itself, so
+    /// that a program can make payloads of a topic that it was built without.
     ///
     /// # Panics
     /// Never: a schema is always JSON.
@@ -61,14 +61,15 @@ impl EnvelopeSchema {
         Description::parse(schema["$comment"].as_str()?).ok()
     }
 
-    /// Whether messages of a topic with the schema `text` are read and written as these are.
+    /// Whether messages of a topic with the schema `text` have the same form as these.
     pub fn fits(&self, text: &[u8]) -> bool {
         let parsed = |text| {
             let mut schema: serde_json::Value = serde_json::from_slice(text).ok()?;
             schema.as_object_mut()?.remove("$comment");
             Some(schema)
         };
-        // Two builds may write the same members in another order, and older ones no comment.
+        // Two builds may write the same members in another order, and older builds write no
+        // comment.
         parsed(text).is_some_and(|other| parsed(&self.text) == Some(other))
     }
 }
@@ -80,24 +81,24 @@ fn as_value(description: &Description) -> serde_json::Value {
 /// What the messages of a channel are.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Content {
-    /// Samples of the topic, as they came.
+    /// Samples of the topic, as they were sent.
     #[default]
     Samples,
-    /// The last sample of the topic from before the file began, with the stamp that it had. It
-    /// stands at the file's beginning so that the file can be used alone, and is counted nowhere.
+    /// The topic's last sample from before the file, with its old stamp. It stands at the file's
+    /// beginning so that the file can be used alone. No count has it.
     Repeated,
-    /// Made of the samples of these topics for viewers; they are no samples.
+    /// Messages for viewers, made from the samples of these topics. They are not samples.
     Derived(String),
 }
 
-/// What the metadata of a channel of derived messages has; the text says of what they are made.
+/// The metadata key of a channel of derived messages. The text names the topics.
 const DERIVED: &str = "lager.derived";
-/// What the metadata of a channel of repeated samples has.
+/// The metadata key of a channel of repeated samples.
 const REPEATED: &str = "lager.repeated";
 
 impl Content {
-    /// The channel's metadata: what a stranger wants to know of the times in it, and what is not
-    /// recorded but repeated or derived.
+    /// The channel's metadata: what its times mean, and whether its messages are repeated or
+    /// derived.
     pub(crate) fn to_notes(&self) -> BTreeMap<String, String> {
         let times = (
             "times",

@@ -6,8 +6,8 @@
 //!                                   └──parts──> Overview ──> Ordered: samples by their time
 //! ```
 //!
-//! Bytes go out of [`Journal`] and into the readers by hand: nothing here opens a file, starts a
-//! thread or reads a clock. So a file that is cut off at any byte is a test without a disk.
+//! The caller takes bytes from [`Journal`] and gives bytes to the readers: nothing here opens a
+//! file, starts a thread or reads a clock. So tests cut a file off at any byte without a disk.
 //!
 //! # The file
 //!
@@ -18,27 +18,28 @@
 //! {"stamp":{"sequence":41,"source_time_ns":…,…},"lost":0,"dropped":0,"payload":{…}}
 //! ```
 //!
-//! `lost` and `dropped` count the topic's samples since the recording began that never reached the
-//! recorder and that it had no time for ([`Envelope`]). They stand in each message, so a file that
-//! was cut off still says what it lacks. The metadata record `lager.counts` has them for the file,
-//! and `lager.recording` says of which robot it is ([`Start`]).
+//! `lost` counts the topic's samples since the recording began that never reached the recorder.
+//! `dropped` counts those for which the disk was too slow ([`Envelope`]). Both stand in each
+//! message, so a file that was cut off still says how many samples are missing. The metadata record
+//! `lager.counts` has them for the whole file, and `lager.recording` names the robot ([`Start`]).
 //!
-//! Each file of a recording can be used alone: it begins with the last sample of every topic that
-//! holds, in a channel of its own whose metadata has the key `lager.repeated` ([`Content`]). Such a
-//! sample keeps its stamp and its publish time; its log time is the file's begin. It is in no count.
+//! Each file of a recording can be used alone. It begins with the last sample of every topic that
+//! carries a state, in a channel of its own whose metadata has the key `lager.repeated`
+//! ([`Content`]). Such a sample keeps its stamp and its publish time. Its log time is the beginning
+//! of the file. No count has it.
 //!
-//! Beside the topics stand channels with the exact `foxglove.*` schemas ([`View`]), derived from
-//! what the topics say ([`Scene`]) so that viewers show map and robot without set-up. Their
-//! channel's metadata has the key `lager.derived`. They are no samples: nobody counts, plays or
+//! Beside the topics there are channels with the exact `foxglove.*` schemas ([`View`]). They are
+//! derived from the topics ([`Scene`]), so that viewers show map and robot at once. The metadata of
+//! such a channel has the key `lager.derived`. Its messages are no samples: nobody counts, plays or
 //! exports them.
 //!
-//! A message's publish time is its stamp's and its log time the same, but never before the
-//! recording began nor after the sample was received; both are ns since 1970, so that tools show a
-//! date. Whether that date can be believed, and when the machine's calendar was set meanwhile, says
-//! the metadata record `lager.calendar` ([`CalendarStep`]).
+//! A message's publish time is that of its stamp. Its log time is the same, but never before the
+//! recording began nor after the recorder received the sample. Both are ns since 1970, so that
+//! tools show a date. The metadata record `lager.calendar` says whether this date can be believed,
+//! and when somebody has set the machine's calendar ([`CalendarStep`]).
 //!
-//! Whole chunks are what survives: a file that was cut off has all of them and no index, and
-//! [`Recovery`] makes a new file of them.
+//! A file that was cut off still has its whole chunks, but no index. [`Recovery`] makes a new file
+//! from these chunks.
 
 #![forbid(unsafe_code)]
 

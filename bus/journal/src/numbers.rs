@@ -1,8 +1,8 @@
-//! The numbers that samples carry, compared with what a file says is missing.
+//! Compares the numbers of samples with the losses that a file admits.
 
 use std::collections::HashMap;
 
-use lager_topics::Stamp;
+use lager_sample::Stamp;
 
 use crate::counts::Count;
 
@@ -15,21 +15,21 @@ pub(crate) struct Numbers {
     pub(crate) stored: u64,
     /// Numbers that were skipped.
     pub(crate) gaps: u64,
-    /// What the first message said of losses.
+    /// The losses that the first message admits.
     first: Option<(u64, u64)>,
-    /// What the last message said of losses.
+    /// The losses that the last message admits.
     last: (u64, u64),
 }
 
-/// A number that is not above the one before it.
+/// A number that is not greater than the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Backwards {
-    /// The number that could come at the earliest.
+    /// The smallest number that could follow.
     pub(crate) expected: u64,
 }
 
 impl Numbers {
-    /// Notes the next sample and what its message says is missing before it.
+    /// Counts the next sample, and the losses that its message admits.
     pub(crate) fn note(&mut self, stamp: &Stamp, lost: u64, dropped: u64) -> Result<(), Backwards> {
         self.stored += 1;
         self.first.get_or_insert((lost, dropped));
@@ -45,8 +45,8 @@ impl Numbers {
         }
     }
 
-    /// The count of a file of which only the messages are left. A recording's first file also has
-    /// what was missing before its first message.
+    /// The counts of a file that has no end, from its messages alone. In a recording's first file
+    /// they include the losses before its first message.
     pub(crate) fn count(&self, is_first_part: bool) -> Count {
         let (lost, dropped) = match self.first {
             Some(first) if !is_first_part => first,
@@ -56,7 +56,7 @@ impl Numbers {
         let lost = self.last.0.saturating_sub(lost);
         Count {
             received: self.stored + dropped,
-            // What stood in a damaged chunk is lost, too.
+            // The samples in a damaged chunk are lost, too.
             lost: lost.max(self.gaps.saturating_sub(dropped)),
             dropped,
         }

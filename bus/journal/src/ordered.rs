@@ -10,14 +10,14 @@ use crate::unpack::Zstd;
 use crate::walk::LONGEST;
 use crate::write::Times;
 
-/// Which messages are read.
+/// Which messages to read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     /// Topics by name; `None` for all.
     pub topics: Option<Vec<String>>,
-    /// No earlier log time, in ns since 1970.
+    /// Only log times from here on, in ns since 1970.
     pub from_ns: Option<u64>,
-    /// Only earlier log times, in ns since 1970.
+    /// Only log times before this, in ns since 1970.
     pub before_ns: Option<u64>,
     /// The latest first.
     pub is_backwards: bool,
@@ -34,31 +34,31 @@ pub struct Ordered<'file> {
 /// What comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step<'a> {
-    /// These bytes are wanted, all of them.
+    /// The reader needs these bytes, all of them.
     Wants(Part),
     /// A message.
     Message(Placed<'a>),
 }
 
-/// A message where it stands in time.
+/// A message with its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Placed<'a> {
     /// The topic's name.
     pub topic: &'a str,
     /// Whether it is the topic's last sample from before the file.
     pub is_repeated: bool,
-    /// When it was.
+    /// Its log time.
     pub times: Times,
     /// The message.
     pub message: &'a [u8],
 }
 
 impl<'file> Ordered<'file> {
-    /// For the file that `overview` is of.
+    /// A reader of the file that `overview` describes.
     ///
     /// # Errors
-    /// The index is damaged, or the selection ends before it begins, or messages stand outside of
-    /// chunks, where none are found.
+    /// The index is damaged, the selection ends before it begins, or messages stand outside of
+    /// chunks, where the index cannot find them.
     pub fn new(overview: &'file Overview, selection: &Selection) -> Result<Self, ReadError> {
         if overview.has_loose {
             return Err(ReadError::Loose);
@@ -71,7 +71,7 @@ impl<'file> Ordered<'file> {
         if let Some(topics) = &selection.topics {
             let mut channels = overview.summary.channels.values();
             if !channels.any(|channel| topics.contains(&channel.topic)) {
-                // The reader takes no channel at all for every channel.
+                // The reader takes "no channel" as "every channel".
                 return Ok(Self {
                     overview,
                     reader: None,
@@ -122,10 +122,10 @@ impl<'file> Ordered<'file> {
         Some(Ok(step))
     }
 
-    /// Takes the bytes that were wanted last.
+    /// Takes the bytes that it needed.
     ///
     /// # Errors
-    /// They are damaged, or not as many as were wanted.
+    /// They are damaged, or their number is wrong.
     pub fn supply(&mut self, bytes: &[u8]) -> Result<(), ReadError> {
         match &mut self.reader {
             Some(reader) => Ok(reader.insert_chunk_record_data(self.wanted, bytes)?),

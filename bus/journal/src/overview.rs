@@ -1,4 +1,5 @@
-//! What a file is: topics, times and counts. Its end alone says so, or all of it must be read.
+//! The overview of a file: topics, times and counts. The file's end has it; without an end, a
+//! reader needs the whole file.
 
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::io::SeekFrom;
@@ -24,20 +25,20 @@ pub struct TopicOverview {
     pub schema: String,
     /// The schema; empty if the file has none.
     pub schema_text: Arc<[u8]>,
-    /// Whether its messages are made of another topic's, and are no samples.
+    /// Whether its messages are derived from other topics, and are not samples.
     pub is_derived: bool,
     /// Messages in the file.
     pub messages: u64,
-    /// Those of them that were sent before the file began, and stand in an earlier one as well.
+    /// How many of them are repeated from an earlier file.
     pub repeated: u64,
-    /// What the file says of its losses; `None` if another program wrote it.
+    /// The losses that the file admits; `None` if another program wrote it.
     pub count: Option<Count>,
 }
 
-/// What a file is.
+/// What a file contains.
 #[derive(Clone, Debug)]
 pub struct Overview {
-    /// Of which robot it is; `None` if another program wrote it.
+    /// The robot that it is of; `None` if another program wrote it.
     pub start: Option<Start>,
     /// By name.
     pub topics: Vec<TopicOverview>,
@@ -58,7 +59,7 @@ pub struct Overview {
     pub(crate) has_loose: bool,
 }
 
-/// Reads an [`Overview`]. Ask what it wants, give it that, until it wants nothing.
+/// Reads an [`Overview`]. Ask it which bytes it needs and supply them, until it needs no more.
 #[derive(Default)]
 pub struct OverviewReader {
     file: u64,
@@ -70,7 +71,7 @@ pub struct OverviewReader {
 }
 
 impl OverviewReader {
-    /// For a file of so many bytes.
+    /// For a file of this length in bytes.
     pub fn new(file: u64) -> Self {
         let options = SummaryReaderOptions::default()
             .with_file_size(file)
@@ -131,7 +132,7 @@ impl OverviewReader {
         Ok(self.notes.front().copied())
     }
 
-    /// Takes what it wanted; fewer bytes mean that the file ends there.
+    /// Takes the bytes that it needed. Fewer bytes mean that the file ends there.
     pub fn supply(&mut self, bytes: &[u8]) {
         if self.read.is_none() {
             self.summary.insert(bytes.len()).copy_from_slice(bytes);
@@ -151,12 +152,12 @@ impl OverviewReader {
     /// What the file is.
     ///
     /// # Errors
-    /// Its end does not say all of it, or not all was supplied.
+    /// The file's end does not say everything, or some bytes were not supplied.
     pub fn finish(self) -> Result<Overview, ReadError> {
         let summary = self.read.ok_or(ReadError::NoIndex)?;
         let stats = summary.stats.clone().ok_or(ReadError::NoIndex)?;
         let has_counts = !stats.channel_message_counts.is_empty() || stats.message_count == 0;
-        // Each record of an index is optional; what is not there must be looked for.
+        // Each record of an index is optional, so a missing one must be found in the file.
         let says_all = has_counts
             && stats.channel_count as usize == summary.channels.len()
             && stats.chunk_count as usize == summary.chunk_indexes.len()
@@ -190,7 +191,7 @@ impl OverviewReader {
     }
 }
 
-/// What a file says in records of our own.
+/// What the records of this project in a file say.
 #[derive(Default)]
 struct Known {
     start: Option<Start>,
@@ -253,8 +254,8 @@ impl Known {
     }
 }
 
-/// Makes an [`Overview`] of a file whose end does not say what it has, from a [`crate::Walk`]
-/// through all of it.
+/// Makes an [`Overview`] of a file whose end does not say everything, with a [`crate::Walk`]
+/// through the whole file.
 #[derive(Default)]
 pub struct Scan {
     known: Known,
@@ -266,7 +267,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// What the file is; `learnt` is what the walk has learnt.
+    /// What the file contains; `learnt` comes from the walk.
     ///
     /// # Errors
     /// The file is damaged.

@@ -1,4 +1,4 @@
-//! What the readers of a file's index share.
+//! The common part of the readers of a file's index.
 
 use mcap::McapError;
 
@@ -16,11 +16,11 @@ pub struct Part {
 /// Why a file's index cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The file does not begin or end as MCAP does.
+    /// The file does not begin or end as an MCAP file does.
     #[error("it is not an MCAP file, or was cut off; `lager bag recover` saves what is whole")]
     NotWhole,
-    /// Its end does not say what it has, which is allowed: all of it must be read.
-    #[error("its end does not say what it has")]
+    /// Its end does not say what the file contains, which is allowed. Read the whole file instead.
+    #[error("its end does not say what the file contains")]
     NoIndex,
     /// Messages stand outside of chunks.
     #[error(

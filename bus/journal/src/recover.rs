@@ -1,8 +1,8 @@
-//! A new file of what is whole in another one that was cut off or damaged.
+//! Makes a new file from the undamaged parts of one that was cut off or damaged.
 //!
-//! Every chunk whose CRC is right is copied, message by message, and the new file gets an index,
-//! its counts and an end. The old file is not touched. Whoever uses this reads the new file again
-//! with a [`crate::Check`] before it says that anything was saved.
+//! It copies every chunk whose CRC is right, message by message. The new file gets an index, counts
+//! and an end. The old file stays as it is. The caller must read the new file with a
+//! [`crate::Check`] before it says that anything was saved.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -17,9 +17,9 @@ use crate::numbers::Numbers;
 use crate::walk::{Damage, Message, Topic, Visit};
 use crate::write::{Channel, Journal, RECORDING, Schema, Start, WriteError};
 
-/// Messages that stand outside of chunks are put into chunks of so many bytes.
+/// Messages that stand outside of chunks go into new chunks of this size in bytes.
 const CHUNK: u64 = 1 << 20;
-/// So many faults of the old file are kept.
+/// At most so many faults of the old file are kept.
 const MOST: usize = 100;
 
 /// What was recovered.
@@ -29,18 +29,18 @@ pub struct Recovered {
     pub messages: u64,
     /// Chunks that were copied.
     pub chunks: u64,
-    /// What is wrong with the old file, as far as it was kept; empty if nothing is.
+    /// The faults of the old file, at most so many as are kept; empty if it has none.
     pub damage: Vec<Damage>,
 }
 
-/// Makes the new file of the old one that a [`crate::Walk`] goes through, the second time: the
-/// first learns the topics, should the chunk that names them be damaged.
+/// Makes the new file while a [`crate::Walk`] goes through the old one for the second time. The
+/// first walk learns the topics, in case the chunk that names them is damaged.
 #[derive(Default)]
 pub struct Recovery {
     journal: Option<Journal>,
     start: Start,
     channels: HashMap<u16, Channel>,
-    /// The schemas that the new file has, each found by where the walk keeps it: many topics may
+    /// The schemas of the new file, each by the address at which the walk keeps it: many topics may
     /// share a large one.
     schemas: HashMap<usize, (Arc<[u8]>, Schema)>,
     numbers: BTreeMap<String, Numbers>,
@@ -57,8 +57,8 @@ impl Recovery {
         }
     }
 
-    /// The last bytes of the new file, and what is in it. No bytes mean that the old file is no
-    /// recording of ours, or that nothing of it is left.
+    /// The last bytes of the new file, and its counts. No bytes mean that the old file is not a
+    /// recording of this project, or that nothing of it is left.
     ///
     /// # Errors
     /// A message cannot be packed again.
@@ -69,8 +69,8 @@ impl Recovery {
         let Some(journal) = self.journal.take() else {
             return Ok((Vec::new(), self.recovered));
         };
-        // What the old file says itself is right as long as all of it was copied. That is counted,
-        // as a chunk whose kind was changed by a flipped bit is no damaged chunk.
+        // The counts of the old file are right only if all of it was copied. The messages decide
+        // that, since a flipped bit may turn a chunk into another record without any damaged chunk.
         let is_copied = |(name, count): (&String, &Count)| {
             let stored = self.numbers.get(name).map_or(0, |numbers| numbers.stored);
             stored == count.received.saturating_sub(count.dropped)
@@ -90,13 +90,14 @@ impl Recovery {
         let Some(journal) = &mut self.journal else {
             return Ok(());
         };
-        // Whoever wrote another message than the recorder gets it back, and no number is counted.
+        // A message of another program is copied as it is, and its numbers do not count.
         let is_repeated = message.topic.content == Content::Repeated;
         let envelope = serde_json::from_slice::<Envelope<IgnoredAny>>(message.data);
         let stamp = envelope.map(|envelope| {
             if !is_repeated {
                 let numbers = self.numbers.entry(message.topic.name.clone()).or_default();
-                // A number that is not above the last one stays as it is; `check` tells.
+                // A number that is not greater than the last one stays as it is; `check` reports
+                // it.
                 let _ = numbers.note(&envelope.stamp, envelope.lost, envelope.dropped);
             }
             envelope.stamp.sequence

@@ -20,7 +20,7 @@ pub(crate) const ZSTD: &str = "zstd";
 
 /// A byte of LZ4 gives at most so many.
 const LZ4_RATIO: u64 = 255;
-/// Bytes of zstd that are unpacked before their number is looked at.
+/// How many bytes of zstd it unpacks before it looks at the budget again.
 const STEP: usize = 1 << 20;
 /// Bytes that all chunks of a file may hold whatever their packed size is.
 const FREE: u64 = 1 << 30;
@@ -40,10 +40,10 @@ impl Default for Budget {
 }
 
 impl Budget {
-    /// Takes what a chunk of so many packed bytes says that it holds.
+    /// Subtracts the size that a chunk of so many packed bytes says it has.
     ///
     /// # Errors
-    /// It cannot hold that much, or the file's chunks hold more than can be meant.
+    /// A chunk cannot be so large, or the file's chunks say that they hold more than is likely.
     pub(crate) fn take(&mut self, header: &ChunkHeader, packed: u64) -> McapResult<()> {
         let size = header.uncompressed_size;
         let most = match header.compression.as_str() {
@@ -60,8 +60,8 @@ impl Budget {
     }
 }
 
-/// What a chunk's zstd holds, at most so many bytes. A false size costs nothing: memory comes as it
-/// is needed.
+/// The content of a chunk of zstd, at most so many bytes. A false size costs nothing, because
+/// memory is taken only when it is needed.
 ///
 /// # Errors
 /// It is damaged, or holds more.
@@ -87,7 +87,8 @@ fn frames(mut packed: &[u8], most: usize) -> Result<Vec<u8>, FrameDecoderError> 
         }
         let mut steps = 0;
         while !decoder.is_finished() {
-            // What a frame may still refer to is held back, however much that is.
+            // The decoder keeps the bytes to which the frame may still refer, however many they
+            // are.
             steps += 1;
             if steps * STEP > most + 2 * STEP {
                 return Err(FrameDecoderError::TargetTooSmall);

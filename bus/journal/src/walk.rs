@@ -1,11 +1,11 @@
-//! A file read from its first byte to its last, without its index.
+//! Reads a file from its first byte to its last, without its index.
 //!
-//! Bytes come in pieces of any size. A chunk is opened and its CRC compared before any message of
-//! it is handed on, so a message that comes out is as it was written. A chunk that is damaged is
-//! told, and the walk goes on behind it.
+//! Bytes come in pieces of any size. The walk opens a chunk and compares its CRC before it hands on
+//! any message, so every message is undamaged. The walk reports a damaged chunk and continues after
+//! it.
 //!
-//! The topics' names stand in a file's first chunk and again in its index. So if the first chunk is
-//! damaged, a second walk that has [`Learnt`] from the first knows them.
+//! The names of the topics stand in a file's first chunk and again in its index. If the first chunk
+//! is damaged, a first walk takes them from the index ([`Learnt`]), and a second walk uses them.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -19,7 +19,7 @@ use crate::envelope::Content;
 use crate::unpack::{Budget, ZSTD, unpack};
 use crate::write::Times;
 
-/// Longer records and chunks are taken for damage.
+/// A longer record or chunk counts as damage.
 pub(crate) const LONGEST: usize = 256 << 20;
 /// Bytes of an operation code and a length in front of each record.
 const PREFIX: u64 = 9;
@@ -27,9 +27,9 @@ const PREFIX: u64 = 9;
 /// What is wrong with a file's bytes.
 #[derive(Debug)]
 pub enum Damage {
-    /// It does not begin as MCAP does.
+    /// It does not begin as an MCAP file does.
     NotMcap,
-    /// It ends before its end.
+    /// It stops before its end.
     Cut {
         /// Bytes from the start that are whole.
         whole: u64,
@@ -45,17 +45,17 @@ pub enum Damage {
     Packed {
         /// Where it begins, in bytes.
         at: u64,
-        /// What it is packed with.
+        /// The packing's name.
         with: String,
     },
-    /// A chunk has messages of topics whose names stood in a chunk that is damaged.
+    /// A chunk has messages of topics whose names were in a damaged chunk.
     Nameless {
         /// Where it begins, in bytes.
         at: u64,
         /// How many.
         messages: u64,
     },
-    /// What follows cannot be read.
+    /// The rest cannot be read.
     Record {
         /// Where it begins, in bytes.
         at: u64,
@@ -110,7 +110,7 @@ pub struct Message<'a> {
     pub channel: u16,
     /// The topic.
     pub topic: &'a Topic,
-    /// When it was.
+    /// Its time.
     pub times: Times,
     /// Whether it stands in a chunk.
     pub is_in_chunk: bool,
@@ -118,20 +118,20 @@ pub struct Message<'a> {
     pub data: &'a [u8],
 }
 
-/// What is told of a file on the way.
+/// What the walk reports of a file.
 pub trait Visit {
     /// A message of a chunk that is whole.
     fn message(&mut self, message: &Message<'_>);
     /// A metadata record.
     fn note(&mut self, name: &str, texts: &BTreeMap<String, String>);
-    /// So many messages of a chunk have been handed on, which are all. `found` is what an index
-    /// would say of it; it knows nothing of message indexes.
+    /// The chunk has no more messages; this was their number. `found` is what an index would say of
+    /// it, without message indexes.
     fn chunk(&mut self, _found: &ChunkIndex, _messages: u64) {}
     /// What the index says of a chunk.
     fn chunk_index(&mut self, _index: &ChunkIndex) {}
     /// What the index says of all.
     fn statistics(&mut self, _statistics: &Statistics) {}
-    /// A chunk that is not readable, or why the walk ends here.
+    /// A chunk that cannot be read, or why the walk ends here.
     fn damage(&mut self, damage: Damage);
 }
 
@@ -140,12 +140,12 @@ pub struct Walk {
     reader: LinearReader,
     known: Learnt,
     at: u64,
-    /// Over all bytes up to here. The reader has such a CRC too, and stops when it is wrong.
+    /// The CRC over all bytes so far. The reader computes it as well, but stops when it is wrong.
     crc: crc32fast::Hasher,
     is_over: bool,
 }
 
-/// The topics of a file, as far as a walk has met them.
+/// The topics of a file that a walk has met.
 #[derive(Clone, Debug, Default)]
 pub struct Learnt {
     schemas: HashMap<u16, (Arc<str>, Arc<[u8]>)>,
@@ -165,7 +165,7 @@ impl Default for Walk {
 }
 
 impl Walk {
-    /// A walk through a file of which another walk has learnt the topics.
+    /// A second walk through a file; the first one has learnt the topics.
     pub fn knowing(known: Learnt) -> Self {
         let options = LinearReaderOptions::default()
             .with_emit_chunks(true)
@@ -198,7 +198,7 @@ impl Walk {
         self.go_on(visit);
     }
 
-    /// The file ends here. Returns what was learnt of its topics.
+    /// The file ends here. Returns the topics that it has learnt.
     pub fn finish(mut self, visit: &mut impl Visit) -> Learnt {
         if !self.is_over {
             self.reader.notify_read(0);
@@ -296,8 +296,8 @@ impl Learnt {
 
     /// Hands on what is in a chunk, once its CRC is right.
     ///
-    /// A reader of its own opens it, since only one that compares the CRC beforehand takes no
-    /// length of a damaged chunk at its word.
+    /// It opens the chunk with a reader that compares the CRC first, because only such a reader
+    /// does not trust the lengths in a damaged chunk.
     fn open(&mut self, chunk: &[u8], visit: &mut impl Visit) -> Result<ChunkHeader, McapError> {
         let Record::Chunk { header, data } = mcap::parse_record(op::CHUNK, chunk)? else {
             unreachable!("a record is of the kind that was asked for");
@@ -326,14 +326,14 @@ impl Learnt {
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => {
                     self.tell_content(&mcap::parse_record(opcode, data)?, true, visit);
                 }
-                // All of the chunk is there, so a wish for more comes after its end.
+                // The reader has the whole chunk, so it needs more only after the chunk's end.
                 Some(Ok(LinearReadEvent::ReadRequest(_))) | None => return Ok(header),
                 Some(Err(error)) => return Err(error),
             }
         }
     }
 
-    /// Hands on what may stand in a chunk, and in files of other programs outside of one.
+    /// Hands on a record that may stand in a chunk; files of other programs have it outside, too.
     fn tell_content(&mut self, record: &Record<'_>, is_in_chunk: bool, visit: &mut impl Visit) {
         match record {
             Record::Schema { header, data } => {

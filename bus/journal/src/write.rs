@@ -13,7 +13,7 @@ use crate::counts::{self, Counts};
 use crate::envelope::{Content, EnvelopeSchema};
 use crate::scene::View;
 
-/// The metadata record that says what a file is of.
+/// The metadata record that says which robot a file is of.
 pub(crate) const RECORDING: &str = "lager.recording";
 /// MCAP's word for who laid out the channels.
 const PROFILE: &str = "lager";
@@ -31,14 +31,14 @@ const STEP: u64 = PREFIX + 128;
 /// Bytes of a metadata record's index at the end.
 const NOTE_INDEX: u64 = PREFIX + 40;
 
-/// What a file is of.
+/// What a file's first record says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Start {
     /// The robot's name.
     pub robot: String,
     /// Which file of the recording this is, from 0.
     pub part: u32,
-    /// What a reader adds to a stamp's time to get ns since 1970.
+    /// The difference between ns since 1970 and a stamp's time.
     pub unix_offset_ns: i64,
 }
 
@@ -53,7 +53,7 @@ impl Start {
         .into()
     }
 
-    /// What is not readable is blank.
+    /// A value that cannot be read is blank.
     pub(crate) fn of_texts(texts: &BTreeMap<String, String>) -> Self {
         let text = |name: &str| texts.get(name).map_or("", String::as_str);
         Self {
@@ -68,16 +68,16 @@ impl Start {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Channel(u16);
 
-/// When a sample was, in ns since 1970.
+/// The times of a sample, in ns since 1970.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Times {
-    /// Where it stands in the recording.
+    /// Its place in time within the recording.
     pub log: u64,
     /// When its writer published it.
     pub publish: u64,
 }
 
-/// Why something cannot stand in a file.
+/// Why a file cannot hold something.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The format numbers its topics with 16 bits.
@@ -134,7 +134,7 @@ impl Journal {
             .profile(PROFILE)
             .library(concat!("lager ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Lz4))
-            // A chunk ends where the caller says so.
+            // The caller says where a chunk ends.
             .chunk_size(None)
             // A chunk is packed as a whole before it comes out.
             .disable_seeking(true)
@@ -152,7 +152,7 @@ impl Journal {
         Ok(journal)
     }
 
-    /// Adds a topic. It stands in the chunk that is open, or in the next.
+    /// Adds a topic, in the open chunk or in the next one.
     ///
     /// # Errors
     /// There are too many.
@@ -162,7 +162,7 @@ impl Journal {
     }
 
     /// Adds a channel for a topic's last sample from before the file. [`Content::Repeated`] says
-    /// how it is read.
+    /// how to read it.
     ///
     /// # Errors
     /// There are too many.
@@ -171,7 +171,7 @@ impl Journal {
         self.channel(name, id, &Content::Repeated)
     }
 
-    /// Adds a channel for what viewers are shown. Its messages are no samples.
+    /// Adds a channel for viewers. Its messages are not samples.
     ///
     /// # Errors
     /// There are too many.
@@ -181,7 +181,7 @@ impl Journal {
         self.channel(view.topic(), id, &Content::Derived(from))
     }
 
-    /// Adds a schema, if the file does not have it yet.
+    /// Adds a schema, unless the file has it already.
     pub(crate) fn schema(&mut self, schema: &EnvelopeSchema) -> Result<Schema, WriteError> {
         let id = self
             .writer
@@ -212,7 +212,7 @@ impl Journal {
         Ok(Channel(channel))
     }
 
-    /// Adds a message to the chunk that is open, or begins one.
+    /// Adds a message to the open chunk, and begins a chunk if none is open.
     ///
     /// # Errors
     /// Never in practice: any bytes can be packed.
@@ -236,7 +236,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Notes that the calendar was set, and ends the chunk that is open.
+    /// Writes that the calendar was set, and ends the open chunk.
     ///
     /// # Errors
     /// Never in practice.
@@ -247,12 +247,12 @@ impl Journal {
         Ok(())
     }
 
-    /// How many bytes the file grows at the most by [`Journal::step`] besides its open chunk.
+    /// How many bytes [`Journal::step`] may add to the file, besides the open chunk.
     pub const fn room_for_a_step() -> u64 {
         STEP + NOTE_INDEX
     }
 
-    /// Ends the chunk that is open. Its bytes can then be taken, and survive whatever follows.
+    /// Ends the open chunk. The caller can take its bytes then, so a later kill does not lose them.
     ///
     /// # Errors
     /// Never in practice.
@@ -280,12 +280,12 @@ impl Journal {
         self.chunk.bytes
     }
 
-    /// How many bytes the file grows at the most, if `more` bytes of messages are added to the
-    /// chunk that is open and the file is then ended. A message is no shorter than a stamp in JSON,
-    /// so a chunk's index is shorter than the chunk.
+    /// How many bytes the file may grow if `more` bytes of messages come into the open chunk and
+    /// the file then ends. A message is at least as long as a stamp in JSON, so a chunk's index is
+    /// shorter than the chunk.
     pub fn room(&self, more: u64) -> u64 {
         let chunk = self.chunk.bytes + more;
-        // LZ4 adds one byte in 255 to what it cannot pack; the index has 16 bytes for a message.
+        // LZ4 adds one byte for 255 that it cannot pack; the index has 16 bytes for each message.
         let packed = 2 * chunk + 1024;
         packed + self.indexes + self.index() + self.end_without_indexes()
     }
@@ -322,7 +322,7 @@ impl Journal {
     }
 }
 
-/// Where the bytes wait until they are taken; clones share it.
+/// Where the bytes wait until somebody takes them; all clones share it.
 #[derive(Clone, Default)]
 struct Out(Rc<RefCell<Waiting>>);
 
@@ -347,7 +347,7 @@ impl Write for Out {
 }
 
 impl Seek for Out {
-    /// Tells the position, and nothing else: what has been taken cannot be changed.
+    /// Tells its position and can do nothing else: bytes that somebody has taken cannot change.
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         match to {
             SeekFrom::Current(0) => Ok(self.0.borrow().length),

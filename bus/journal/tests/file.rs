@@ -7,7 +7,8 @@ use lager_journal::{
     Message, Ordered, Overview, OverviewReader, Part, ReadError, Recovered, Recovery, Report,
     Selection, Start, Step, Times, Visit, Walk,
 };
-use lager_topics::{Description, Field, LineFrame, Stamp, Truth, describe};
+use lager_sample::{Description, Field, Stamp, describe};
+use lager_topics::{LineFrame, Truth};
 use proptest::prelude::*;
 
 const TOPICS: [&str; 2] = ["sensor/line", "truth/pose"];

@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use lager_floor::Heading;
 use lager_journal::{
     Check, Envelope, EnvelopeSchema, Journal, Learnt, Overview, OverviewReader, Recovery, Scene,
     Shown, Start, Times, View, Visit, Walk,
 };
+use lager_sample::{Description, Field, Payload, Stamp, describe};
 use lager_topics::{
-    BlockedWay, BlockedWays, Description, Failure, FailureKind, Field, Heading, LineFrame,
-    MapProduct, NavigatorStatus, Payload, Phase, Role, Side, Stamp, Thought, ThoughtKind, Truth,
-    TruthGood, WarehouseMap, describe,
+    BlockedWay, BlockedWays, Failure, FailureKind, LineFrame, MapProduct, NavigatorStatus, Phase,
+    Role, Thought, ThoughtKind, Truth, TruthGood, WarehouseMap,
 };
 use serde_json::Value;
 
@@ -38,7 +39,7 @@ fn map() -> WarehouseMap {
         id: 7,
         x: 1,
         y: 0,
-        side: Side::Up.into(),
+        side: Heading::Up.into(),
         ..MapProduct::default()
     };
     map

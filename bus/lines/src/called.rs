@@ -1,11 +1,13 @@
-//! What a person calls a product: its number, or the name that its warehouse gives it (AMB-38).
+//! How a person names a product: by its number, or by the name that the warehouse gives it
+//! (AMB-38).
 //!
-//! Robot and GaG know numbers only, so a name is looked up where a person uses it, and a number
-//! goes on from there. A name is no number, has neither comma, semicolon nor line break and no
-//! blank at an end, as in the goods string (M3), and no two products of a warehouse share one.
+//! Robot and GaG know only numbers. So a name is turned into its number where a person uses it. A
+//! name is not a number, has no comma, semicolon or line break and no blank at its ends, as in the
+//! goods string (M3). No two products of a warehouse have the same name.
 //!
 //! ```
-//! use lager_lines::{Called, ProductId};
+//! use lager_floor::ProductId;
+//! use lager_lines::Called;
 //!
 //! let goods = [(7, Some("screws")), (12, None)];
 //! let number = |text: &str| text.parse::<Called>().unwrap().among(goods);
@@ -25,12 +27,13 @@ use core::fmt::{self, Write as _};
 use core::str::FromStr;
 use std::collections::BTreeSet;
 
+use lager_floor::ProductId;
+use lager_orders::{Code, Reason};
 use thiserror::Error;
 
 use crate::strings::{LabelError, check_label};
-use crate::warehouse::ProductId;
 
-/// A product as a person calls it.
+/// A product as a person names it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Called {
     /// By its number.
@@ -39,52 +42,27 @@ pub enum Called {
     Name(String),
 }
 
-/// Why nothing can be called so.
+/// Why no product can have such a name or number.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CalledError {
-    /// It is a number, and none of a product.
+    /// It is a number that no product can have.
     #[error("{text} is no product's number; products are numbered from 0 to 2147483647")]
     Number {
-        /// As given.
+        /// The text.
         text: String,
     },
-    /// It cannot stand for a product.
+    /// No product can have such a name.
     #[error(transparent)]
     Label(#[from] LabelError),
 }
 
-/// Why a warehouse cannot have these names.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum NamesError {
-    /// Nothing can be called so.
-    #[error("a product is named {name:?}: {why}")]
-    Unfit {
-        /// The name.
-        name: String,
-        /// Why not.
-        why: CalledError,
-    },
-    /// It would be taken for a number.
-    #[error("a product is named {name:?}, which would be taken for its number; use a letter")]
-    Number {
-        /// The name.
-        name: String,
-    },
-    /// Two have it.
-    #[error("two products are named {name:?}; every name needs to be another one")]
-    Twice {
-        /// The name.
-        name: String,
-    },
-}
-
-/// There is no product that is called so.
+/// No product has this name or number.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("the warehouse has no product {called}; it has {known}")]
 pub struct UnknownProduct {
-    /// What was called.
+    /// The name or number.
     pub called: Called,
-    /// The products that there are, as people call them.
+    /// The warehouse's products, with their names.
     pub known: String,
 }
 
@@ -119,11 +97,11 @@ impl From<ProductId> for Called {
 }
 
 impl Called {
-    /// The number of the one that is called so among `products`, each with its number and name.
+    /// The number of the product with this name or number, from `products` with their names.
     ///
     /// # Errors
     ///
-    /// When none of them is.
+    /// No product has it.
     pub fn among<'n>(
         &self,
         products: impl IntoIterator<Item = (i32, Option<&'n str>)> + Clone,
@@ -142,31 +120,26 @@ impl Called {
     }
 }
 
-/// Finds out whether a warehouse can have these names.
+/// Checks whether a warehouse can have these names.
 ///
 /// # Errors
 ///
-/// When one of them is none, or two are the same.
-pub fn check_names<'n>(names: impl IntoIterator<Item = &'n str>) -> Result<(), NamesError> {
+/// A name is not valid, or two products have the same name.
+pub fn check_names<'n>(names: impl IntoIterator<Item = &'n str>) -> Result<(), Reason> {
     let mut seen = BTreeSet::new();
     for name in names {
-        let owned = || name.to_owned();
-        match name.parse() {
-            Ok(Called::Name(_)) => {}
-            Ok(Called::Number(_)) => return Err(NamesError::Number { name: owned() }),
-            Err(why) => {
-                let name = owned();
-                return Err(NamesError::Unfit { name, why });
-            }
-        }
-        if !seen.insert(name) {
-            return Err(NamesError::Twice { name: owned() });
-        }
+        let why = match name.parse() {
+            Ok(Called::Name(_)) if seen.insert(name) => continue,
+            Ok(Called::Name(_)) => Code::NameTwice,
+            Ok(Called::Number(_)) => Code::NameNumber,
+            Err(_) => Code::NameUnfit,
+        };
+        return Err(Reason::new(why, &[&name]));
     }
     Ok(())
 }
 
-/// Products in a row, as in `7 (screws), 12`.
+/// Products as a list, such as `7 (screws), 12`.
 fn listed<'n>(products: impl IntoIterator<Item = (i32, Option<&'n str>)>) -> String {
     let mut list = String::new();
     for (number, name) in products {

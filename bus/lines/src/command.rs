@@ -1,4 +1,4 @@
-//! The codes of commands as text (AMB-4): what stands behind `styrcomm` and `armcomm`.
+//! The codes of commands as text (AMB-4): the words after `styrcomm` and `armcomm`.
 //!
 //! | form | example | |
 //! |---|---|---|
@@ -7,21 +7,21 @@
 //! | hexadecimal | `0xF3` | `0x` or `0X`, digits of either case |
 //! | bare hexadecimal | `F3` | two characters, the first `F` or `f`; the arm alone has them |
 //!
-//! The wheels have the codes 1 to 9, the arm F1 to FA in hexadecimal (K). The codes are an
-//! operator's: [`OperatorCommand::firmware`] makes a board's command of them, since 7 means
-//! another thing there (AMB-2).
+//! The wheels have the codes 1 to 9, the arm F1 to FA in hexadecimal (K). These are an operator's
+//! codes. [`OperatorCommand::firmware`] turns one into a board's command, because 7 means something
+//! else there (AMB-2).
 //!
 //! ```
-//! use lager_lines::command::{Wheels, read_arm, read_wheels};
+//! use lager_lines::command::{Code, read_arm, read_wheels};
 //! use lager_wire::{ArmCommand, OperatorCommand};
 //!
 //! assert_eq!(read_wheels("7").map(OperatorCommand::from), Ok(OperatorCommand::Right));
 //! for text in ["F3", "0xf3", "243", "11110011"] {
 //!     assert_eq!(read_arm(text).unwrap().get(), ArmCommand::In);
 //! }
-//! assert_eq!(Wheels::new(OperatorCommand::Right).unwrap().to_string(), "00000111");
+//! assert_eq!(Code(OperatorCommand::Right).to_string(), "00000111");
 //!
-//! // What the other one of the two is asked for is refused, and so is what no list has.
+//! // A code of the arm is refused for the wheels, and so is a code that no list has.
 //! assert_eq!(
 //!     read_wheels("F3").unwrap_err().to_string(),
 //!     "243 is no code of the wheels; they have 1 to 9"
@@ -34,13 +34,14 @@
 
 use core::fmt;
 
+use lager_orders::Wheels;
 use lager_wire::{Binary, CodeTextError, OperatorArm, OperatorCommand, parse_code};
 use thiserror::Error;
 
-/// Why a text is not the code of a command.
+/// Why a text is not a code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum CommandError {
-    /// It is no code at all.
+    /// It has none of the four forms.
     #[error("{0}")]
     Text(CodeTextError),
     /// The wheels have no such code (G8).
@@ -57,37 +58,6 @@ pub enum CommandError {
     },
 }
 
-/// An operator's command to the wheels, one with a code from 1 to 9.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Wheels(OperatorCommand);
-
-impl Wheels {
-    /// Whether it is the command to stand.
-    pub const fn is_stop(self) -> bool {
-        matches!(self.0, OperatorCommand::Stop)
-    }
-
-    /// The command, unless it is one to the arm.
-    pub const fn new(command: OperatorCommand) -> Option<Self> {
-        match command {
-            OperatorCommand::Arm(_) => None,
-            wheels => Some(Self(wheels)),
-        }
-    }
-}
-
-impl From<Wheels> for OperatorCommand {
-    fn from(wheels: Wheels) -> Self {
-        wheels.0
-    }
-}
-
-impl fmt::Display for Wheels {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Code(self.0).fmt(formatter)
-    }
-}
-
 /// A command's code as it is written: eight binary digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Code(pub OperatorCommand);
@@ -102,7 +72,7 @@ impl fmt::Display for Code {
 ///
 /// # Errors
 ///
-/// When the text is no code or the wheels have none like it.
+/// The text is not a code, or the wheels do not have it.
 pub fn read_wheels(text: &str) -> Result<Wheels, CommandError> {
     let code = code(text)?;
     OperatorCommand::from_code(code)
@@ -114,7 +84,7 @@ pub fn read_wheels(text: &str) -> Result<Wheels, CommandError> {
 ///
 /// # Errors
 ///
-/// When the text is no code or the arm has none like it that an operator may give.
+/// The text is not a code, or the arm does not have it, or an operator may not give it.
 pub fn read_arm(text: &str) -> Result<OperatorArm, CommandError> {
     let code = code(text)?;
     match OperatorCommand::from_code(code) {
@@ -127,7 +97,7 @@ fn code(text: &str) -> Result<u8, CommandError> {
     if let [b'F' | b'f', digit] = text.as_bytes()
         && digit.is_ascii_hexdigit()
     {
-        // The same number with its sign of hexadecimals.
+        // The same number, written with 0x.
         return parse_code(&format!("0x{text}")).map_err(CommandError::Text);
     }
     parse_code(text).map_err(CommandError::Text)

@@ -1,9 +1,10 @@
-//! The conversation of a robot with the external computer (C1-C9): the lines of either side, and
-//! which answer is awaited.
+//! The conversation of a robot with the external computer (C1-C9): the lines of both sides, and the
+//! question that is open.
 //!
-//! The robot connects by TCP and asks; Robert, the server, answers, from what GaG answers him or
+//! The robot connects by TCP and asks. Robert, the server, answers: from the answers of a GaG, or
 //! from what he knows (C1). The lines are those of [`gag`](crate::gag), with the robot in Robert's
-//! place and Robert in GaG's. This is a robot that fetches product 7, `>` its lines, `<` Robert's:
+//! place and Robert in GaG's. In this example a robot fetches product 7; `>` marks its lines, `<`
+//! Robert's:
 //!
 //! ```text
 //! > sidelength                     (C3)
@@ -14,7 +15,7 @@
 //! < prodlis 2 7 1 0 down 12 0 1 left
 //! > fetchprod                      held until the user has chosen (AMB-43)
 //! < fetchprod 7
-//! > set_robot 1 0                  the next node (C8, L500)
+//! > set_robot 1 0                  the next node (C8)
 //! > set_heading right
 //! > thought I am in position
 //! > armcomm                        (C7)
@@ -25,17 +26,16 @@
 //! > fetchprod                      only now again (C6)
 //! ```
 //!
-//! - One question is held at a time (C4, C5). A new one takes the place of the one before, as when
-//!   the robot is switched to manual while `fetchprod` is held: then it asks `styrcomm` (L436), and
-//!   an answer to `fetchprod` that is under way is passed over.
-//! - While either of `styrcomm` and `armcomm` is held, a command of the other kind answers it as
-//!   well, because a person drives and moves the arm by one keyboard. `pickup_done` answers
-//!   `armcomm` alone.
-//! - `thought`, `set_robot` and `set_heading` may come at any time and are not answered.
-//! - `styrcomm 1` makes the robot stand. It latches nothing: the next command moves it again.
+//! - One question is open at a time (C4, C5). A new question replaces it. For example, a robot
+//!   waits for the answer to `fetchprod` when somebody switches it to manual mode: then it asks
+//!   `styrcomm` (C4), and ignores a late answer to `fetchprod`.
+//! - A command of either kind answers both `styrcomm` and `armcomm`, because a person drives and
+//!   moves the arm with one keyboard. `pickup_done` answers only `armcomm`.
+//! - `thought`, `set_robot` and `set_heading` may come at any time. Nobody answers them.
+//! - `styrcomm 1` makes the robot stand, until the next command moves it again.
 //!
-//! What is an extension of this stands in [`extension`](crate::extension); a peer that knows only
-//! the lines above never meets it but for one line, which it does not answer.
+//! [`extension`](crate::extension) has more lines. A peer that knows only the lines above gets one
+//! line of the extension, and does not answer it.
 //!
 //! ```
 //! use lager_lines::conversation::{AnswerRefused, Held, RobotLine, StationLine};
@@ -66,7 +66,7 @@ use crate::misread::Misread;
 pub enum RobotLine {
     /// A question or telemetry of the document.
     Request(Request),
-    /// That the robot speaks the extension.
+    /// The robot speaks the extension.
     Hello(Hello),
     /// A line of the extension.
     Report(Report),
@@ -77,7 +77,7 @@ impl RobotLine {
     ///
     /// # Errors
     ///
-    /// When a robot has no such line.
+    /// A robot never says such a line.
     pub fn read(line: &str) -> Result<Self, Misread> {
         if let Some(hello) = Hello::read(line) {
             return hello.map(Self::Hello);
@@ -104,29 +104,29 @@ impl fmt::Display for RobotLine {
 pub enum StationLine {
     /// An answer of the document.
     Answer(Answer),
-    /// That the station speaks the extension.
+    /// The station speaks the extension.
     Hello(Hello),
     /// A line of the extension.
     Order(Order),
 }
 
-/// Why a line is none of the external computer's.
+/// Why an external computer cannot have said this line.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum StationLineError {
-    /// It announces the extension wrongly.
+    /// Its announcement of the extension is wrong.
     #[error(transparent)]
     Hello(Misread),
-    /// Its first word is none of the extension's, and it is no answer.
+    /// It is neither a line of the extension nor an answer.
     #[error(transparent)]
     Answer(AnswerError),
-    /// It orders nothing that can be done.
+    /// It gives an order that does not exist.
     #[error(transparent)]
     Order(ActionError),
 }
 
 impl StationLineError {
-    /// Whether its first word is none that an external computer says, as where a peer answers the
-    /// extension's first line that it does not understand it.
+    /// Whether an external computer never begins a line with this word. A peer that does not know
+    /// the extension may answer its first line like that.
     pub fn is_of_nobody(&self) -> bool {
         matches!(self, Self::Answer(AnswerError::Misread(misread)) if misread.column == 1)
     }
@@ -137,7 +137,7 @@ impl StationLine {
     ///
     /// # Errors
     ///
-    /// When an external computer has no such line.
+    /// An external computer never says such a line.
     pub fn read(line: &str) -> Result<Self, StationLineError> {
         if let Some(hello) = Hello::read(line) {
             return hello.map(Self::Hello).map_err(StationLineError::Hello);
@@ -161,8 +161,8 @@ impl fmt::Display for StationLine {
     }
 }
 
-/// Which question is held. Both sides keep one: the robot to know what an answer is to, Robert to
-/// know what he may answer.
+/// The question that is open. Both sides keep one: the robot knows by it what an answer means, and
+/// Robert knows what he may answer.
 ///
 /// ```text
 ///            ask                      ask: takes its place
@@ -174,41 +174,41 @@ impl fmt::Display for StationLine {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Held(Option<Query>);
 
-/// Why a line that is an answer answers nothing. It is passed over.
+/// Why an answer fits no open question. The receiver ignores it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum AnswerRefused {
-    /// No question is held.
+    /// No question is open.
     #[error("nothing is asked; wait for a question")]
     NothingHeld,
-    /// Another question is held.
+    /// Another question is open.
     #[error("`{held}` is asked, and this does not answer it")]
     Other {
-        /// What is held.
+        /// The open question.
         held: Query,
     },
 }
 
 impl Held {
-    /// The question that is held.
+    /// The open question.
     pub const fn get(self) -> Option<Query> {
         self.0
     }
 
-    /// `query` is asked; it takes the place of one that is held.
+    /// The robot asks `query`, which replaces an open question.
     pub fn ask(&mut self, query: Query) {
         self.0 = Some(query);
     }
 
-    /// Nothing is asked any more, as when a connection ends.
+    /// No question is open any more, for example because the connection has ended.
     pub fn clear(&mut self) {
         self.0 = None;
     }
 
-    /// Takes an answer and gives the question it is to, which is then no longer held.
+    /// Takes an answer. Returns its question and closes it.
     ///
     /// # Errors
     ///
-    /// When this answers no question that is held; the question stays.
+    /// The answer fits no open question. An open question stays open.
     pub fn answer(&mut self, answer: &Answer) -> Result<Query, AnswerRefused> {
         let held = self.0.ok_or(AnswerRefused::NothingHeld)?;
         let of_a_person = [Query::Arm, Query::Wheels];

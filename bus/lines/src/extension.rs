@@ -9,25 +9,26 @@
 //! any other peer the robot never sends another line of the extension, and it ignores what such a
 //! peer answers to the first line.
 //!
-//! A robot may repeat its first line at any time, and a station answers it each time, so each side
-//! knows that the other is there. A robot repeats it every 50 ms, and stops when nothing at all has
-//! come from the station for 150 ms while it carries something out that the station gave.
+//! A robot may repeat its first line at any time, and a station answers it each time. So each side
+//! knows that the other one is there. A robot repeats it every 50 ms. While it carries out
+//! something that the station gave, it stops when the station has said nothing at all for 150 ms.
 //!
 //! # Nothing moves late
 //!
-//! Behind the line that it repeats the robot puts its clock in ms: `lager 1 r1 81250`. The station's
-//! answer repeats that number: `lager 1 station 81250`. Lines arrive in the order in which they were
-//! said, so the station said whatever comes behind that answer after the robot's clock showed this
-//! number, and it cannot be older. That holds however long a link, a socket or a process held it up.
-//! A station puts into a `do` besides for how long it was given already, as by a page. What moves
-//! the robot or lets it move, the answers of the document among it, is refused when the two together
-//! exceed 200 ms, and everything else but a stop when they exceed 2 s.
+//! When the robot repeats its first line, it adds its clock in ms: `lager 1 r1 81250`. The
+//! station's answer repeats that number: `lager 1 station 81250`. Lines arrive in the order in
+//! which they were sent. So the station sent every line after that answer later than the robot's
+//! clock showed this number, and the line cannot be older, however long a link, a socket or a
+//! process held it up. In a `do` the station also says how old the order was already, for example
+//! because a page was slow. The robot adds both ages. It refuses an order that moves it or lets it
+//! move, also an answer of the document, when they exceed 200 ms. It refuses any other order but a
+//! stop when they exceed 2 s.
 //!
-//! # Who proves it
+//! # Proof of the name
 //!
 //! A station that knows a secret of the robot by that name does not believe the first line. It asks
-//! for a proof, and proves itself in turn ([`secret`](crate::secret)); a robot that has a secret
-//! says nothing more, and carries out nothing, before it has heard that:
+//! for a proof, and proves itself in turn ([`secret`](crate::secret)). A robot that has a secret
+//! says nothing more, and carries out nothing, before it has received that proof:
 //!
 //! ```text
 //! > lager 1 r1
@@ -41,14 +42,13 @@
 //! nonces              = the station's "\n" the robot's, both as digits
 //! ```
 //!
-//! Where a station takes a robot that has announced itself no longer, or refuses another who has
-//! announced himself by its name, it says why: `thought <text>`. It may then end the connection.
+//! When a station gives up a robot that has announced itself, or refuses another one with its name,
+//! it says why: `thought <text>`. It may then end the connection.
 //!
-//! # Between both
+//! # Order of the lines
 //!
-//! The document's questions and answers go on between the lines below. These are asynchronous in
-//! both directions: neither side waits for a line before it sends its own. The first word tells the
-//! kind of a line.
+//! The document's questions and answers go on between the lines below. Neither side waits for a
+//! line before it sends its own. The first word says the kind of a line.
 //!
 //! # Station to robot
 //!
@@ -59,43 +59,22 @@
 //!
 //! <number> ::= <int>                   0 to 4294967295, one not used before on this connection
 //! <ms>     ::= <int>                   for how long it was given when this was said
-//! <action> ::= order <order> <prodid>  fetch a product after those that wait
-//!            | cancel <order>          fetch it no more; refused once its goods are held
-//!            | first <order>           fetch it before those that wait
-//!            | up <order>              fetch it before the one that is now before it
-//!            | clear                   fetch none of those that wait
-//!            | mode <mode>             who drives
-//!            | resume <stop>           end this stop, as `stop=` of the state tells it; refused
-//!                                      where another one was set meanwhile
-//!            | reset                   the robot stands on the delivery corner, looking inwards
-//!            | place <edge>            it stands on that node and looks that way; a simulated one
-//!                                      is put there
-//!            | pick manual|auto        who picks the goods up from now on: a person, or the robot
-//!            | picked [force]          the goods are in the gripper; force: felt or not
-//!            | drive <styrcomm> <ms>   the wheels, for 1 to 1000 ms from receipt
-//!            | arm <armcomm>           one step of the arm
-//!            | gains <int> <int>       of the error and of its change, each 0 to 255
-//!            | calibrate               the line sensors, on the tape under the robot
-//!            | obstacle put <edge>     in a simulated world
-//!            | obstacle take <edge>
-//! <order>  ::= <int>                   0 to 4294967295, chosen by the station; 0 is refused
-//! <mode>   ::= manual | autonomous
-//! <edge>   ::= <coord> <direction>     from a node to the next one that way
+//! <action>                             one of those of [`Action`](lager_orders::Action)
 //! ```
 //!
-//! `drive` is renewed by a further `do` before its time is over, with or without another command;
-//! code 8 and 9 are turns that run once and need no renewal. A robot counts the time by its own
-//! clock from when it has read the line, and stands when it is over. A setpoint is done when the
-//! steering board has it, a turn or a step of the arm when it has ended, a calibration likewise,
-//! and everything else when the robot shows the effect.
+//! A further `do` with `drive` renews the drive before its time is over, with the same command or
+//! another one. The codes 8 and 9 are turns that run once and need no renewal. A robot counts the
+//! time by its own clock from the moment when it reads the line, and stands when it is over. The
+//! answer `done` comes, for a setpoint, when the steering board has it; for a turn, a step of the
+//! arm or a calibration, when it has ended; and for everything else, when the robot shows the
+//! effect.
 //!
-//! **A stop has a lane of its own.** Whoever sends puts it before all lines that wait to be sent;
-//! whoever receives reads on to the end of what has arrived and carries out every stop in it before
-//! anything else. It is never queued, and commands to wheels and arm that wait are dropped (C5);
-//! the products to fetch still wait. A `resume`, `drive` or `arm` that arrives together with a stop
-//! is refused, whichever of the two was sent first. A line whose first word is `stop` is a stop
-//! even if what follows cannot be read; then it has no number and is not confirmed. Only `resume`
-//! ends it.
+//! **A stop has a lane of its own.** The sender puts it before all lines that wait. The receiver
+//! reads on to the end of what has arrived, and carries out every stop in it first. A stop never
+//! waits in a queue. It drops commands to wheels and arm that wait (C5), but not the products to
+//! fetch. If a `resume`, `drive` or `arm` arrives together with a stop, the robot refuses it,
+//! whichever was sent first. A line whose first word is `stop` is a stop even if the rest cannot be
+//! read; then it has no number and gets no confirmation. Only `resume` ends a stop.
 //!
 //! # Robot to station
 //!
@@ -103,7 +82,7 @@
 //! stopped <number> <int>               the steering board reports both motors off under the stop,
 //!                                      that many ms after its receipt
 //! done <number>
-//! refused <number> <text>              why it was not done
+//! refused <number> <reason>            why it was not done
 //! state {<key>=<value>}                20 times a second; see `State`
 //! route <int> {<coord>}                nodes of the way; how many there are, and the first of them
 //! blocked <int> {<edge> <int>}         ways that are not taken, likewise, and since when, in s of
@@ -125,7 +104,11 @@
 //!                                      the most that it has read, 0 to 255 and higher over tape,
 //!                                      and 1 once that is both floor and tape
 //! thinks {<key>=<value>}               the `thought` that follows, in values; see `Thinks`
+//! because <reason>                     why it says the `thought` that follows
 //! thought <text>                       as in the document
+//!
+//! <reason> ::= <code> {<value>}        a name in the table of sentences, and what stands in the
+//!                                      sentence; see `lager_orders::Reason`
 //!
 //! <event> ::= in_position | getting_item | item_delivered | next_node | refused
 //!           | pickup_refused | failed | way_blocked | stopped | resumed | mode | restarted
@@ -137,14 +120,15 @@
 //! is divided into four equal parts. Bucket 89 holds what took longer than 2^30 ns. A bucket
 //! counts the frames since the robot made such a line before, at most 999999.
 //!
-//! Here a list may be empty, and `route`, `blocked`, `queue`, `obstacles`, `gone` and `sensors` are
-//! sent when they have changed. A line that cannot be read changes nothing; if it has a number the
-//! robot answers `refused`.
+//! A list may be empty here. The robot sends `route`, `blocked`, `queue`, `obstacles`, `gone` and
+//! `sensors` when they have changed. A line that cannot be read changes nothing; if it has a
+//! number, the robot answers `refused`.
 //!
 //! ```
 //! use lager_lines::conversation::{RobotLine, StationLine};
-//! use lager_lines::extension::{Action, Order, Report};
+//! use lager_lines::extension::{Order, Report};
 //! use lager_lines::to_line;
+//! use lager_orders::Action;
 //!
 //! let asked = StationLine::read("do 17 order 4 7").unwrap();
 //! let StationLine::Order(Order::Do { number, action, .. }) = asked else { panic!() };
@@ -168,7 +152,6 @@
 mod fields;
 mod hello;
 mod listed;
-mod mode;
 mod order;
 mod proof;
 mod report;
@@ -177,9 +160,8 @@ mod thinks;
 
 pub use fields::{Degrees, Loads, Servos};
 pub use hello::Hello;
-pub use listed::{Block, Edge, Listed, Queued};
-pub use mode::{Mode, Pick};
-pub use order::{Action, ActionError, LeaseMs, Order, Put};
+pub use listed::{Block, Listed, Queued};
+pub use order::{ActionError, Order, Spelled};
 pub use proof::Proof;
 pub use report::{Event, EventKind, Latency, Report, TruePose};
 pub use state::State;

@@ -1,8 +1,8 @@
-//! The document's grammar of GaG and Robert (G1-G10): who asks, and what is answered.
+//! The document's grammar of GaG and Robert (G1-G10): the questions and their answers.
 //!
-//! Robert, the server on the external computer, sends one line; GaG, the user interface, answers
-//! with one line where there is an answer. `→` in this table is the document's: a request and its
-//! answer.
+//! Robert, the server on the external computer, sends one line. GaG, the user interface, sends one
+//! line back if there is an answer. The sign `→` in this table stands between a request and its
+//! answer, as in the document.
 //!
 //! ```text
 //! sidelength        → sidelength <cm>                              side of a square (G4)
@@ -15,35 +15,33 @@
 //! set_robot <coord> → nothing                                      where it is (G9)
 //! set_heading <direction> → nothing                                where it looks (G9)
 //!
-//! <cm>        ::= <int>                       1 to 65535
-//! <coord>     ::= <int> <int>                 x y, each 0 to 255; a size 1 to 255
+//! <cm>        ::= <int>                       40 to 500
+//! <coord>     ::= <int> <int>                 x y, each 0 to 255; a size 1 to 99
 //! <product>   ::= <prodid> <coord> <side>
 //! <prodid>    ::= <int>                       0 to 2147483647, each product has its own
 //! <side>      ::= <direction>
 //! <direction> ::= left | up | right | down
 //! ```
 //!
-//! - The document spells the list of products `prodlis` and must have meant `prodlist`; both are
-//!   read, and an answer repeats the spelling that was asked (AMB-40). Its number says how many
-//!   products follow, which may be 0 (AMB-41). All stand in one line, so that up to [`MAX_LINE`]
-//!   bytes of them can be listed, some sixty products.
-//! - `karta` and `sidelength` are answered once the user has filled them in, `fetchprod`, `armcomm`
-//!   and `styrcomm` once he has chosen (AMB-42, AMB-43): an answer may take as long as it likes,
-//!   and what needs no answer may be sent meanwhile.
-//! - A GaG may give commands faster than the robot takes them: `armcomm`, `styrcomm` and
-//!   `pickup_done` that nobody has asked for wait with Robert, as long as the robot asks for
-//!   commands at all. At most 32 wait, a stop takes their place, and what does not wait is refused
-//!   in a `thought` (C5).
-//! - A command that never ends by itself ends with its GaG: where the socket closes, or where what
-//!   GaG is told lies unread for 200 ms, Robert has the robot stand. So that a GaG that has frozen
-//!   is found, Robert repeats the question that is held while the robot moves by GaG's word, five
-//!   times a second; it wants one answer. A GaG that waits for its user reads on meanwhile.
-//! - What moves the robot counts for 200 ms: a command that Robert finds later, because he was held
-//!   up, is refused in a `thought`, and the question is asked again.
-//! - `pickup_done` is the answer to `armcomm` that ends the picking; the document has the signal
-//!   but no word for it (AMB-44).
-//! - The codes of commands are read in four forms and written in one; see
-//!   [`command`](crate::command).
+//! - The document writes the list of products `prodlis` and must have meant `prodlist`. Robert
+//!   reads both, and an answer repeats the spelling of the question (AMB-40). Its number says how
+//!   many products follow, which may be 0 (AMB-41). They all stand in one line, so at most
+//!   [`MAX_LINE`] bytes of them fit, some sixty products.
+//! - GaG answers `karta` and `sidelength` once the user has described the warehouse, and
+//!   `fetchprod`, `armcomm` and `styrcomm` once the user has chosen (AMB-42, AMB-43). An answer may
+//!   take any time. Lines that need no answer may come meanwhile.
+//! - A GaG may give commands faster than the robot takes them. While the robot asks for commands at
+//!   all, `armcomm`, `styrcomm` and `pickup_done` wait with Robert until it asks for them. At most
+//!   32 wait, and a stop replaces them. Robert refuses in a `thought` what cannot wait (C5).
+//! - A command that never ends by itself ends with its GaG. If the socket closes, or GaG leaves a
+//!   line unread for 200 ms, Robert makes the robot stand. To find a GaG that has frozen, Robert
+//!   repeats the open question five times a second while a command of GaG moves the robot; GaG
+//!   answers it once. A GaG must go on reading while it waits for its user.
+//! - A command that moves the robot counts for 200 ms. If Robert was held up and reads it later, he
+//!   refuses it in a `thought` and asks again.
+//! - `pickup_done` answers `armcomm` and ends the picking. The document has this signal but no word
+//!   for it (AMB-44).
+//! - A code has four forms for reading and one for writing; see [`command`](crate::command).
 //! - A text begins behind the one blank after `thought` and goes to the end of the line.
 //!
 //! ```
@@ -64,8 +62,8 @@
 //! );
 //! assert_eq!(
 //!     Answer::read("karta 4 3 2 3").unwrap_err().to_string(),
-//!     "column 11: (2, 3) is no corner of the warehouse; \
-//!      the delivery is at (0, 0), (0, 3), (4, 0) or (4, 3)",
+//!     "column 11: the delivery is at (2, 3), which is no corner of the floor; \
+//!      its corners are (0, 0), (0, 3), (4, 0) and (4, 3)",
 //! );
 //! assert_eq!(
 //!     Request::read("thought  två blanka").unwrap().to_string(),
@@ -78,24 +76,24 @@
 use core::fmt;
 use core::time::Duration;
 
+use lager_floor::{FloorError, Grid, Heading, MAX_PRODUCTS, Node, Product, ProductId, SideLength};
+use lager_orders::Reason;
+use lager_orders::lease::{LATEST, LATEST_MOVE};
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
 use crate::command::{Code, CommandError, read_arm, read_wheels};
-use crate::late::{LATEST, LATEST_MOVE};
+use crate::floor::{Products, Spelled as _, Words, grid};
 use crate::misread::Misread;
 use crate::reader::{Reader, Word};
 use crate::text::Text;
-use crate::warehouse::{
-    Coord, Direction, Map, MapError, Product, ProductId, Products, ProductsError, SideLength,
-};
 
 /// How the list of products is spelled (AMB-40).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ListWord {
-    /// `prodlis`, as the document has it.
+    /// `prodlis`, as the document writes it.
     Prodlis,
-    /// `prodlist`, as it must have been meant.
+    /// `prodlist`, as the document must have meant it.
     Prodlist,
 }
 
@@ -109,12 +107,12 @@ impl ListWord {
     }
 }
 
-/// What is asked and answered.
+/// The questions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Query {
     /// `sidelength`: how long the side of a square is (G4, C3).
     SideLength,
-    /// `karta`: how large the warehouse is and where it is left (G3).
+    /// `karta`: how large the warehouse is, and at which corner the robot leaves it (G3).
     Map,
     /// `prodlis` or `prodlist`: which products there are (G5).
     Products(ListWord),
@@ -127,7 +125,7 @@ pub enum Query {
 }
 
 impl Query {
-    /// Every question, the list of products by both of its words.
+    /// Every question; the list of products with both spellings.
     pub const ALL: [Self; 7] = [
         Self::SideLength,
         Self::Map,
@@ -138,7 +136,7 @@ impl Query {
         Self::Wheels,
     ];
 
-    /// The word that asks it.
+    /// The question's word.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::SideLength => "sidelength",
@@ -155,23 +153,23 @@ impl Query {
     }
 }
 
-/// What is told and not answered (G9).
+/// Lines that nobody answers (G9).
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Telemetry {
-    /// `thought`: what the robot has to say.
+    /// `thought`: a thought of the robot.
     Thought(Text),
-    /// `set_robot`: the node at which it is, or to which it goes (L500).
-    Robot(Coord),
-    /// `set_heading`: where it looks.
-    Heading(Direction),
+    /// `set_robot`: the node at which it is, or to which it goes (C8).
+    Robot(Node),
+    /// `set_heading`: which way it looks.
+    Heading(Heading),
 }
 
-/// A line of the side that asks: Robert towards GaG, the robot towards Robert.
+/// A line of the side that asks: Robert asks GaG, and the robot asks Robert.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Request {
-    /// It is answered.
+    /// It needs an answer.
     Query(Query),
-    /// It is not answered.
+    /// It needs no answer.
     Telemetry(Telemetry),
 }
 
@@ -183,7 +181,7 @@ impl Request {
     ///
     /// # Errors
     ///
-    /// When the grammar does not have it.
+    /// The grammar does not have this line.
     pub fn read(line: &str) -> Result<Self, Misread> {
         let mut reader = Reader::new(line);
         let word = reader.word();
@@ -195,8 +193,8 @@ impl Request {
                 let text = reader.rest_as_text()?;
                 return Ok(Self::Telemetry(Telemetry::Thought(text)));
             }
-            "set_robot" => Telemetry::Robot(Coord::read(&mut reader)?),
-            "set_heading" => Telemetry::Heading(Direction::read(&mut reader)?),
+            "set_robot" => Telemetry::Robot(Node::read(&mut reader)?),
+            "set_heading" => Telemetry::Heading(Heading::read(&mut reader)?),
             _ => return Err(word.misread(Self::WANTED)),
         };
         reader.end().map(|()| Self::Telemetry(telemetry))
@@ -213,8 +211,8 @@ impl fmt::Display for Telemetry {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Thought(text) => write!(formatter, "thought {text}"),
-            Self::Robot(coord) => write!(formatter, "set_robot {coord}"),
-            Self::Heading(direction) => write!(formatter, "set_heading {direction}"),
+            Self::Robot(node) => write!(formatter, "set_robot {}", Words(node)),
+            Self::Heading(heading) => write!(formatter, "set_heading {heading}"),
         }
     }
 }
@@ -228,46 +226,46 @@ impl fmt::Display for Request {
     }
 }
 
-/// A line of the side that answers: GaG towards Robert, Robert towards the robot.
+/// A line of the side that answers: GaG answers Robert, and Robert answers the robot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// To `sidelength`.
     SideLength(SideLength),
     /// To `karta`.
-    Map(Map),
-    /// To `prodlis` or `prodlist`, spelled like this.
+    Map(Grid),
+    /// To `prodlis` or `prodlist`, with this spelling.
     Products(ListWord, Products),
     /// To `fetchprod`.
     Fetch(ProductId),
-    /// To `styrcomm` if the wheels do it, to `armcomm` if the arm does.
+    /// To `styrcomm` if it is for the wheels, to `armcomm` if it is for the arm.
     Command(OperatorCommand),
     /// To `armcomm`: the goods are in the gripper (AMB-44).
     PickupDone,
 }
 
-/// Why a line is no answer.
+/// Why a line is not an answer.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum AnswerError {
-    /// Something else stands there than belongs there.
+    /// A word is wrong.
     #[error(transparent)]
     Misread(#[from] Misread),
-    /// There is no such warehouse.
+    /// Such a warehouse cannot exist.
     #[error("column {column}: {error}")]
     Map {
-        /// Where the size or the delivery begins, in characters from 1.
+        /// Where the wrong size or delivery begins, in characters from 1.
         column: usize,
         /// What is wrong with it.
-        error: MapError,
+        error: Reason,
     },
-    /// This is no list of products.
+    /// Such a list of products cannot exist.
     #[error("column {column}: {error}")]
     Products {
-        /// Where the product begins that is wrong, in characters from 1.
+        /// Where the wrong product begins, in characters from 1.
         column: usize,
         /// What is wrong with it.
-        error: ProductsError,
+        error: Reason,
     },
-    /// This is no command's code.
+    /// No command has this code.
     #[error("column {column}: {error}")]
     Command {
         /// Where it begins, in characters from 1.
@@ -281,7 +279,7 @@ impl Answer {
     const WANTED: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, \
                           styrcomm and pickup_done";
 
-    /// How late it may come. What is said of the warehouse, and a command to stand, are never too
+    /// How late it may come. Answers about the warehouse, and a command to stand, are never too
     /// late.
     pub const fn latest(&self) -> Duration {
         match self {
@@ -298,8 +296,8 @@ impl Answer {
     ///
     /// # Errors
     ///
-    /// When the grammar does not have it, or when what it says cannot be: a delivery that is in no
-    /// corner, two products with one number, a code that is not of the list.
+    /// The grammar does not have this line, or its content is impossible: the delivery is not at a
+    /// corner, two products have one number, or no command has the code.
     pub fn read(line: &str) -> Result<Self, AnswerError> {
         let mut reader = Reader::new(line);
         let word = reader.word();
@@ -307,7 +305,7 @@ impl Answer {
             Some(Query::SideLength) => Self::SideLength(SideLength::read(&mut reader)?),
             Some(Query::Map) => Self::Map(read_map(&mut reader)?),
             Some(Query::Products(word)) => Self::Products(word, read_products(&mut reader)?),
-            Some(Query::Fetch) => Self::Fetch(ProductId::from_word(reader.word())?),
+            Some(Query::Fetch) => Self::Fetch(ProductId::read(&mut reader)?),
             Some(Query::Arm) => Self::Command(read_command(reader.word(), |code| {
                 read_arm(code).map(OperatorCommand::Arm)
             })?),
@@ -321,8 +319,8 @@ impl Answer {
         Ok(answer)
     }
 
-    /// Whether this may answer `query`: the same word, the list of products by either of its words,
-    /// and `pickup_done` to `armcomm`.
+    /// Whether this may answer `query`: it has the same word. Both words for the list of products
+    /// count as the same, and `pickup_done` answers `armcomm`.
     pub fn is_to(&self, query: Query) -> bool {
         match (self, query) {
             (Self::SideLength(_), Query::SideLength)
@@ -335,7 +333,7 @@ impl Answer {
         }
     }
 
-    /// The same answer, with the list of products spelled as `query` asks for it (AMB-40).
+    /// The same answer, with the list of products spelled as in `query` (AMB-40).
     #[must_use]
     pub fn spelled_as(self, query: Query) -> Self {
         match (self, query) {
@@ -349,13 +347,20 @@ impl fmt::Display for Answer {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::SideLength(side) => write!(formatter, "sidelength {side}"),
-            Self::Map(map) => write!(formatter, "karta {map}"),
+            Self::Map(map) => {
+                write!(
+                    formatter,
+                    "karta {} {}",
+                    Words(&map.size()),
+                    Words(&map.delivery())
+                )
+            }
             Self::Products(word, products) => {
                 let products = products.as_slice();
                 write!(formatter, "{} {}", word.as_str(), products.len())?;
                 products
                     .iter()
-                    .try_for_each(|product| write!(formatter, " {product}"))
+                    .try_for_each(|product| write!(formatter, " {}", Words(product)))
             }
             Self::Fetch(product) => write!(formatter, "fetchprod {product}"),
             Self::Command(given) => {
@@ -366,25 +371,16 @@ impl fmt::Display for Answer {
     }
 }
 
-fn read_map(reader: &mut Reader<'_>) -> Result<Map, AnswerError> {
-    let at_size = reader.ahead();
-    let size = Coord {
-        x: reader
-            .word()
-            .number("a width of 1 to 255 squares", 0, 255)?,
-        y: reader
-            .word()
-            .number("a height of 1 to 255 squares", 0, 255)?,
-    };
-    let at_delivery = reader.ahead();
-    let delivery = Coord::read(reader)?;
-    Map::new(size, delivery).map_err(|error| AnswerError::Map {
-        column: match error {
-            MapError::Empty { .. } => at_size.column(),
-            MapError::Delivery { .. } => at_delivery.column(),
+fn read_map(reader: &mut Reader<'_>) -> Result<Grid, AnswerError> {
+    let delivery = ["an x from 0 to 255", "a y from 0 to 255"];
+    grid(
+        || reader.word(),
+        delivery,
+        |column, error| AnswerError::Map {
+            column,
+            error: error.into(),
         },
-        error,
-    })
+    )
 }
 
 fn read_products(reader: &mut Reader<'_>) -> Result<Products, AnswerError> {
@@ -392,20 +388,19 @@ fn read_products(reader: &mut Reader<'_>) -> Result<Products, AnswerError> {
     let count: usize = reader.word().number(wanted, 0, i64::from(u16::MAX))?;
     let mut places = Vec::new();
     let mut products = Vec::new();
-    // A count that is too large finds the line's end and not the memory's.
+    // If the number is too large, the line ends first: no memory is taken for it.
     for _ in 0..count {
         places.push(reader.ahead());
-        products.push(Product {
-            id: ProductId::from_word(reader.word())?,
-            square: Coord::read(reader)?,
-            side: Direction::read(reader)?,
-        });
+        products.push(Product::read(reader)?);
     }
     Products::new(products).map_err(|error| {
-        let ProductsError::Twice { index, .. } = error;
+        let wrong = match error {
+            FloorError::ProductTwice { index, .. } => index,
+            _ => MAX_PRODUCTS,
+        };
         AnswerError::Products {
-            column: places[index].column(),
-            error,
+            column: places[wrong].column(),
+            error: error.into(),
         }
     })
 }

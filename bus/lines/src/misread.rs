@@ -1,19 +1,19 @@
-//! What is wrong with a line, where, and what belongs there.
+//! Says what is wrong with a line, in which column, and what should stand there.
 
 use core::fmt;
 
-/// Something else stands in a line than what belongs there.
+/// A part of a line is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Misread {
     /// Where, in characters from 1.
     pub column: usize,
-    /// What belongs there, as the end of a sentence.
+    /// What should stand there, as the end of a sentence.
     pub wanted: &'static str,
     /// What stands there.
     pub found: Found,
 }
 
-/// What stands in a line.
+/// What a line has at some place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
     /// Nothing: the line ends.
@@ -53,7 +53,7 @@ impl fmt::Display for Misread {
                 formatter,
                 "column {column}: nothing stands here, but {wanted} belongs here"
             ),
-            // Escaped, so that it can be shown in a terminal.
+            // Escaped, so that a terminal can show it.
             Found::Word(word) => write!(
                 formatter,
                 "column {column}: {word:?} stands here, but {wanted} belongs here"

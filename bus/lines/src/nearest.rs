@@ -1,10 +1,10 @@
-//! What somebody may have meant who has mistyped a word: the nearest of those that there are.
+//! Finds the word that a mistyped one stands for: the most similar of the known words.
 //!
-//! It is for error sentences only. Nothing acts upon a guess.
+//! Only error sentences use it. No program acts on a guess.
 
-/// The candidate that `word` is most like, if one is like it at all: at most a third of the longer
-/// word, and at least one letter, is changed, added, left out or exchanged with the one beside it.
-/// Of several that are as near the first one counts. Upper and lower case are the same here.
+/// The candidate that is most similar to `word`, if one is similar enough: at most a third of the
+/// longer word's letters, and at least one, may be changed, added, left out or exchanged with the
+/// next letter. Of equally similar ones the first counts. Upper and lower case count as equal.
 ///
 /// ```
 /// use lager_lines::nearest;
@@ -20,7 +20,7 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         let other = letters(candidate);
         let most = (word.len().max(other.len()) / 3).max(1);
         let distance = distance(&word, &other);
-        // A word of which nothing is left is like every other.
+        // A word without letters would be similar to every other.
         let is_like = distance <= most && distance < word.len().max(other.len());
         is_like.then_some((distance, candidate))
     });
@@ -29,7 +29,7 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// The name that was meant, where a serde error tells that one is unknown and which there are.
+/// The right name, if a serde error says that a name is unknown and lists the known ones.
 ///
 /// ```
 /// let why = "unknown field `sied`, expected one of `id`, `square`, `side`";
@@ -40,21 +40,20 @@ pub fn meant(message: &str) -> Option<&str> {
     let (_, names) = message
         .split_once("unknown field `")
         .or_else(|| message.split_once("unknown variant `"))?;
-    // What stands between every other pair of marks: the typed one, and those that there are.
+    // The error quotes the typed name and the known names between marks.
     let mut quoted = names.split('`').step_by(2);
     let typed = quoted.next()?;
     nearest(typed, quoted)
 }
 
-/// What such an error is to be followed by: `; did you mean `side`?`, or nothing if no name that
-/// would have been right is like it.
+/// The end of such an error: `; did you mean `side`?`, or nothing if no known name is similar.
 pub fn hint(message: &str) -> String {
     meant(message).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"))
 }
 
-/// How many letters have to be changed, added, left out or exchanged with the next one.
+/// How many letters differ: changed, added, left out, or exchanged with the next one.
 fn distance(from: &[char], to: &[char]) -> usize {
-    // Three rows of the table suffice: an exchange looks two back.
+    // Three rows of the table are enough: an exchange looks back over two.
     let mut before_last: Vec<usize> = Vec::new();
     let mut last: Vec<usize> = (0..=to.len()).collect();
     for (i, a) in from.iter().enumerate() {

@@ -14,7 +14,7 @@ pub(crate) struct Reader<'a> {
     at: usize,
 }
 
-/// A word and where it stands. Behind the last word it is an empty one.
+/// A word and its place. After the last word, it is an empty word.
 #[derive(Clone, Copy)]
 pub(crate) struct Word<'a> {
     pub(crate) text: &'a str,
@@ -28,7 +28,7 @@ impl<'a> Reader<'a> {
         Self { line, at: 0 }
     }
 
-    /// All of the line as one word.
+    /// The whole line as one word.
     pub(crate) fn whole(line: &'a str) -> Word<'a> {
         Word {
             text: line,
@@ -51,12 +51,12 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The next word, which is still to be read.
+    /// The next word, without taking it.
     pub(crate) fn ahead(mut self) -> Word<'a> {
         self.word()
     }
 
-    /// Everything behind the one blank after the last word, as it stands.
+    /// Everything after the one blank that follows the last word, unchanged.
     pub(crate) fn rest_as_text(&mut self) -> Result<Text, Misread> {
         let rest = &self.line[self.at..];
         let text = rest.strip_prefix(BLANKS).unwrap_or(rest);
@@ -74,7 +74,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// That nothing is left.
+    /// Checks that nothing is left.
     pub(crate) fn end(mut self) -> Result<(), Misread> {
         let word = self.word();
         if word.text.is_empty() {
@@ -91,7 +91,7 @@ impl<'a> Word<'a> {
         self.line[..self.start].chars().count() + 1
     }
 
-    /// That something else belongs here.
+    /// The error that something else should stand here.
     pub(crate) fn misread(self, wanted: &'static str) -> Misread {
         Misread {
             column: self.column(),
@@ -100,7 +100,7 @@ impl<'a> Word<'a> {
         }
     }
 
-    /// The number this is, if it is one of those from `least` to `most`.
+    /// This word as a number from `least` to `most`.
     pub(crate) fn number<T: TryFrom<i64>>(
         self,
         wanted: &'static str,
@@ -116,7 +116,7 @@ impl<'a> Word<'a> {
             .ok_or_else(|| self.misread(wanted))
     }
 
-    /// The value `read` makes of this word.
+    /// This word as the value that `read` makes of it.
     pub(crate) fn read<T>(
         self,
         wanted: &'static str,
@@ -125,13 +125,13 @@ impl<'a> Word<'a> {
         read(self.text).ok_or_else(|| self.misread(wanted))
     }
 
-    /// What is before and behind the first mark `by`, if there is one.
+    /// The parts before and after the first mark `by`, if there is one.
     pub(crate) fn split(self, by: char) -> Option<(Self, Self)> {
         let before = self.text.find(by)?;
         Some((self.first(before), self.from(before + by.len_utf8())))
     }
 
-    /// The parts between the marks `by`, each where it stands.
+    /// The parts between the marks `by`, each with its place.
     pub(crate) fn parts(self, by: char) -> impl Iterator<Item = Word<'a>> {
         let mut start = self.start;
         self.text.split(by).map(move |text| {
@@ -153,18 +153,18 @@ impl<'a> Word<'a> {
         self.from(before).first(text.len())
     }
 
-    /// The same without the mark `last`, if it ends with that.
+    /// The same without the mark `last` at its end.
     pub(crate) fn without_last(self, last: char) -> Self {
         let text = self.text.strip_suffix(last).unwrap_or(self.text);
         self.first(text.len())
     }
 
-    /// The empty place behind it.
+    /// The empty place after it.
     pub(crate) fn end(self) -> Self {
         self.from(self.text.len())
     }
 
-    /// What is left of it behind its first `bytes`.
+    /// Its rest after its first `bytes`.
     fn from(self, bytes: usize) -> Self {
         Self {
             text: &self.text[bytes..],

@@ -1,13 +1,12 @@
-//! What a robot and its station know and nobody else: a secret, by which each proves to the other
-//! that it is who it says.
+//! A secret that only a robot and its station know. With it each proves its name to the other.
 //!
-//! The secret itself is never said. Each side chooses a [`Nonce`], and says the HMAC-SHA256 of both
-//! nonces and the robot's name under the secret (`extension::Proof`). Who listens cannot say it
-//! again, because the other side's next nonce is another one; and what the robot says is not what
-//! the station says, so nobody passes with what he was told himself.
+//! Nobody ever sends the secret itself. Each side chooses a [`Nonce`], and sends the HMAC-SHA256 of
+//! both nonces and the robot's name, made with the secret (`extension::Proof`). Somebody who
+//! listens cannot use an old proof, because the other side's next nonce is different. Nor can he
+//! send back what he received, because the robot's proof and the station's differ.
 //!
-//! It proves who is at the other end when a connection begins. It hides nothing that is said: over
-//! a network that others can write to, robot and station talk through a tunnel.
+//! This proves who is at the other end when a connection begins. It does not encrypt. On a network
+//! where others can write, robot and station need a tunnel.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -24,7 +23,7 @@ use crate::text::{Name, NameError};
 ///
 /// # Errors
 ///
-/// When the system has none to give.
+/// The system cannot give any.
 pub fn random<const N: usize>() -> io::Result<[u8; N]> {
     let mut bytes = [0; N];
     let got = getrandom(&mut bytes, GetRandomFlags::empty())?;
@@ -34,11 +33,11 @@ pub fn random<const N: usize>() -> io::Result<[u8; N]> {
     Ok(bytes)
 }
 
-/// A secret: 16 to 256 visible ASCII characters. It is not shown where it is printed for debugging.
+/// A secret: 16 to 256 visible ASCII characters. Debug output hides it.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Secret(String);
 
-/// Why something is no secret, or no list of secrets.
+/// Why a text is not a secret, or not a list of secrets.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SecretError {
     /// It is too short or too long.
@@ -58,7 +57,7 @@ pub enum SecretError {
         /// Where, from 1.
         line: usize,
     },
-    /// What should be a robot's name is none.
+    /// The robot's name is not valid.
     #[error("line {line}: {error}")]
     Name {
         /// Where, from 1.
@@ -66,13 +65,13 @@ pub enum SecretError {
         /// Why not.
         error: NameError,
     },
-    /// More stands there than a name and a secret.
+    /// The line has more than a name and a secret.
     #[error("line {line}: write `<name> <secret>`, or one secret alone for all robots")]
     Words {
         /// Where, from 1.
         line: usize,
     },
-    /// It is told twice.
+    /// A robot has two secrets.
     #[error("line {line}: there is a secret of this robot, or of all, already; keep one of them")]
     Twice {
         /// Where, from 1.
@@ -84,11 +83,11 @@ pub enum SecretError {
 }
 
 impl Secret {
-    /// A new one, of 256 random bits.
+    /// A new secret of 256 random bits.
     ///
     /// # Errors
     ///
-    /// When the system has no random bytes to give.
+    /// The system cannot give random bytes.
     pub fn random() -> io::Result<Self> {
         Ok(Self(hex(&random::<32>()?)))
     }
@@ -104,25 +103,25 @@ impl Secret {
         Ok(Self(text.to_owned()))
     }
 
-    /// The secret as it stands in a file.
+    /// The secret as text, for a file.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// A word of 32 hexadecimal digits that follows from the secret and from what it is for, and
-    /// from which nobody learns the secret.
+    /// A word of 32 hexadecimal digits, made from the secret and a purpose. Nobody can compute the
+    /// secret from it.
     pub fn word(&self, purpose: &str) -> String {
         let mac = self.mac(&["lager word", purpose]);
         hex(&mac.finalize().into_bytes()[..16])
     }
 
-    /// What this side says to prove that it knows the secret.
+    /// This side's proof that it knows the secret.
     pub fn code(&self, side: Side, meeting: &Meeting<'_>) -> Code {
         Code(self.meet(side, meeting).finalize().into_bytes().into())
     }
 
-    /// Whether that side knows the secret, who has said this code. It takes as long whatever of the
-    /// code is right.
+    /// Whether this code proves that the other side knows the secret. It always takes the same
+    /// time, however much of the code is right.
     pub fn is_proved(&self, side: Side, meeting: &Meeting<'_>, code: &Code) -> bool {
         self.meet(side, meeting).verify_slice(&code.0).is_ok()
     }
@@ -137,7 +136,7 @@ impl Secret {
         self.mac(&[side.as_str(), robot.as_str(), &stations, &robots])
     }
 
-    /// Over parts of which none has a line break.
+    /// The HMAC over these parts, none of which has a line break.
     fn mac(&self, parts: &[&str]) -> Hmac<Sha256> {
         let mut mac = Hmac::new_from_slice(self.0.as_bytes()).expect("a key of any length");
         for part in parts {
@@ -154,7 +153,7 @@ impl fmt::Debug for Secret {
     }
 }
 
-/// Who proves.
+/// The side that proves something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// The robot, to the station.
@@ -172,34 +171,35 @@ impl Side {
     }
 }
 
-/// The beginning of one connection.
+/// The values with which one connection begins.
 #[derive(Clone, Copy, Debug)]
 pub struct Meeting<'m> {
     /// The robot's name.
     pub robot: &'m Name,
-    /// What the station has chosen.
+    /// The station's nonce.
     pub stations: Nonce,
-    /// What the robot has chosen.
+    /// The robot's nonce.
     pub robots: Nonce,
 }
 
-/// What one side has chosen for one connection: 16 random bytes, written as 32 hexadecimal digits.
+/// A number that one side chooses for one connection: 16 random bytes, written as 32 hexadecimal
+/// digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Nonce([u8; 16]);
 
 impl Nonce {
     pub(crate) const WANTED: &str = "32 digits of 0-9 and a-f";
 
-    /// That of these bytes.
+    /// The nonce with these bytes.
     pub const fn new(bytes: [u8; 16]) -> Self {
         Self(bytes)
     }
 
-    /// A new one.
+    /// A new nonce.
     ///
     /// # Errors
     ///
-    /// When the system has no random bytes to give.
+    /// The system cannot give random bytes.
     pub fn random() -> io::Result<Self> {
         random().map(Self)
     }
@@ -215,15 +215,15 @@ impl fmt::Display for Nonce {
     }
 }
 
-/// What proves that its speaker knows a secret: 32 bytes, written as 64 hexadecimal digits. It is
-/// compared by [`Secret::is_proved`].
+/// A proof that its sender knows a secret: 32 bytes, written as 64 hexadecimal digits.
+/// [`Secret::is_proved`] checks it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Code([u8; 32]);
 
 impl Code {
     pub(crate) const WANTED: &str = "64 digits of 0-9 and a-f";
 
-    /// That of these bytes.
+    /// The proof with these bytes.
     pub const fn new(bytes: [u8; 32]) -> Self {
         Self(bytes)
     }
@@ -239,10 +239,10 @@ impl fmt::Display for Code {
     }
 }
 
-/// The secrets that somebody knows: of each robot its own, or one of all robots, or both.
+/// The secrets that a station or a robot knows: one for each robot, or one for all, or both.
 ///
-/// As text each stands on a line of its own, `<name> <secret>` or a secret alone. Empty lines and
-/// lines that begin with `#` are passed over.
+/// As text, each line has one secret, as `<name> <secret>` or alone. Empty lines and lines that
+/// begin with `#` do not count.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Secrets {
     named: BTreeMap<Name, Secret>,
@@ -254,7 +254,7 @@ impl Secrets {
     ///
     /// # Errors
     ///
-    /// When a line is none, or there is no secret.
+    /// When a line is not valid, or there is no secret.
     pub fn read(text: &str) -> Result<Self, SecretError> {
         let mut secrets = Self::default();
         for (line, text) in (1..).zip(text.lines().map(str::trim)) {
@@ -301,7 +301,7 @@ impl Secrets {
 }
 
 impl From<Secret> for Secrets {
-    /// One of all robots.
+    /// One secret for all robots.
     fn from(secret: Secret) -> Self {
         Self {
             named: BTreeMap::new(),

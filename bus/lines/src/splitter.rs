@@ -1,4 +1,4 @@
-//! Bytes in any pieces become lines.
+//! Makes lines of bytes that come in pieces of any size.
 //!
 //! ```text
 //!              byte                            the byte beyond MAX_LINE
@@ -12,10 +12,10 @@
 //!            └──────────────────────────────────────────────────────┘
 //! ```
 //!
-//! A line ends with LF or CR LF. A line that is longer than [`MAX_LINE`] bytes is refused once, as
-//! soon as that is certain, and skipped to its end; the next line is read as usual. A line without
-//! its end is never returned, because the peer may have been cut off in it. Memory is bounded by
-//! one line.
+//! A line ends with LF or CR LF. A line of more than [`MAX_LINE`] bytes is refused once, as soon as
+//! that is certain, and skipped to its end. The next line is read as usual. A line without its end
+//! is never returned, because the connection may have ended in its middle. The splitter keeps at
+//! most one line in memory.
 //!
 //! ```
 //! use lager_lines::splitter::{LineError, LineSplitter};
@@ -36,16 +36,16 @@ use thiserror::Error;
 
 use crate::writer::MAX_LINE;
 
-/// Why a line is refused. The lines behind it are not affected.
+/// Why a line is refused. The lines after it are not affected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum LineError {
-    /// It is longer than [`MAX_LINE`] bytes. What follows of it is passed over.
+    /// It is longer than [`MAX_LINE`] bytes. The rest of it is skipped.
     #[error("the line has more than {MAX_LINE} bytes; send shorter ones")]
     TooLong,
     /// It is not UTF-8.
     #[error("column {column}: here the line is not UTF-8; send it in that encoding")]
     NotUtf8 {
-        /// Where the first byte stands that belongs to no character, in characters from 1.
+        /// Where the first wrong byte stands, in characters from 1.
         column: usize,
     },
 }
@@ -53,7 +53,7 @@ pub enum LineError {
 /// Takes bytes and gives lines.
 #[derive(Clone, Debug)]
 pub struct LineSplitter {
-    /// One more than a line has, for the CR before the LF.
+    /// Has room for one byte more than a line, for the CR before the LF.
     buffer: [u8; MAX_LINE + 1],
     used: usize,
     state: State,
@@ -61,11 +61,11 @@ pub struct LineSplitter {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// The line in the buffer goes on.
+    /// The line in the buffer is not complete.
     Filling,
-    /// The line in the buffer has been given; the next byte begins a new one.
+    /// The line in the buffer has been returned; the next byte begins a new one.
     Given,
-    /// The line has been refused as too long and has not ended.
+    /// The line was too long, and has not ended yet.
     Skipping,
 }
 
@@ -79,8 +79,8 @@ impl LineSplitter {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a line is complete or refused; `None` when all
-    /// are taken before.
+    /// Takes bytes from the front of `bytes` until a line is complete or refused. `None` if all
+    /// bytes are taken before that.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Result<&str, LineError>> {
         while let Some((&byte, rest)) = bytes.split_first() {
             *bytes = rest;
@@ -91,8 +91,8 @@ impl LineSplitter {
         None
     }
 
-    /// Bytes of a line that has no end yet and may still become one. Where a connection ends with
-    /// some, its peer was cut off in the middle of a line.
+    /// How many bytes of an incomplete line wait here. If there are any when a connection ends, it
+    /// ended in the middle of a line.
     pub const fn pending(&self) -> usize {
         match self.state {
             State::Filling => self.used,
@@ -100,7 +100,7 @@ impl LineSplitter {
         }
     }
 
-    /// Takes one byte and tells whether the line ends or is refused by it.
+    /// Takes one byte. Returns whether the line ends or is refused with it.
     fn take(&mut self, byte: u8) -> bool {
         if self.state == State::Given {
             self.used = 0;
@@ -117,7 +117,7 @@ impl LineSplitter {
                 self.state = State::Given;
                 true
             }
-            // Only a CR may be the byte beyond the limit: an LF may follow.
+            // The byte after the limit may only be a CR, because an LF may follow.
             (_, byte) if self.used < MAX_LINE || (self.used == MAX_LINE && byte == b'\r') => {
                 self.buffer[self.used] = byte;
                 self.used += 1;

@@ -5,18 +5,19 @@
 //! goods  "v1,x1,y1,s1;v2,x2,y2,s2;..."    v = number or name, x, y = square, s = side (M3)
 //! ```
 //!
-//! - X and Y are 1 to 255; (x, y) is one of (0, 0), (0, Y), (X, 0), (X, Y) (M2).
+//! - X and Y are 1 to 99; (x, y) is one of (0, 0), (0, Y), (X, 0), (X, Y) (M2).
 //! - s is 0 to 3, clockwise: 0 left, 1 up, 2 right, 3 down.
-//! - v is any text without a comma, a semicolon or a line break, and not empty. GaG's grammar has
-//!   numbers only (AMB-38), so a list with names has no [`Products`].
-//! - Blanks around a field are read and not written. A semicolon behind the last product may stand
-//!   or not; none is written. No goods are the empty string.
+//! - v is any text without a comma, a semicolon or a line break, and is not empty. GaG's grammar
+//!   has only numbers (AMB-38), so [`Products`] cannot hold a list with names.
+//! - Blanks around a field are ignored. A semicolon after the last product may stand there. This
+//!   crate writes neither. An empty string is an empty list of goods.
 //!
 //! ```
+//! use lager_floor::Node;
 //! use lager_lines::strings::{Goods, map_string, read_map};
 //!
 //! let map = read_map("4,3,0,3").unwrap();
-//! assert_eq!(map.to_string(), "4 3 0 3");
+//! assert_eq!(map.size(), Node::new(4, 3));
 //! assert_eq!(map_string(map), "4,3,0,3");
 //!
 //! let goods = Goods::read("7,1,0,3;skruvar,0,1,0;").unwrap();
@@ -33,37 +34,37 @@
 
 use core::fmt;
 
+use lager_floor::{Grid, Heading, Node, Product, ProductId};
+use lager_orders::Reason;
 use thiserror::Error;
 
+use crate::floor::{Products, grid, product};
 use crate::misread::Misread;
 use crate::reader::{Reader, Word};
-use crate::warehouse::{
-    Coord, Direction, Map, MapError, Product, ProductId, Products, ProductsError,
-};
 
 /// The map as a string (M1).
-pub fn map_string(map: Map) -> String {
-    let Coord {
+pub fn map_string(map: Grid) -> String {
+    let Node {
         x: width,
         y: height,
     } = map.size();
-    let Coord { x, y } = map.delivery();
+    let Node { x, y } = map.delivery();
     format!("{width},{height},{x},{y}")
 }
 
-/// Why a string is no map.
+/// Why a string is not a map.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum MapStringError {
-    /// Something else stands there than belongs there.
+    /// A field is wrong.
     #[error(transparent)]
     Misread(#[from] Misread),
-    /// There is no such warehouse.
+    /// Such a warehouse cannot exist.
     #[error("column {column}: {error}")]
     Map {
-        /// Where the size or the delivery begins, in characters from 1.
+        /// Where the wrong size or delivery begins, in characters from 1.
         column: usize,
         /// What is wrong with it.
-        error: MapError,
+        error: Reason,
     },
 }
 
@@ -71,45 +72,33 @@ pub enum MapStringError {
 ///
 /// # Errors
 ///
-/// When it is not four numbers with commas between, or there is no such warehouse.
-pub fn read_map(text: &str) -> Result<Map, MapStringError> {
+/// It is not four numbers with commas between, or such a warehouse cannot exist.
+pub fn read_map(text: &str) -> Result<Grid, MapStringError> {
     let mut fields = fields_of(Reader::whole(text));
-    let at_size = fields.ahead();
-    let size = Coord {
-        x: fields
-            .next()
-            .number("a width of 1 to 255 squares", 0, 255)?,
-        y: fields
-            .next()
-            .number("a height of 1 to 255 squares", 0, 255)?,
-    };
-    let at_delivery = fields.ahead();
-    let delivery = Coord {
-        x: fields
-            .next()
-            .number("the x of the delivery, 0 to 255", 0, 255)?,
-        y: fields
-            .next()
-            .number("the y of the delivery, 0 to 255", 0, 255)?,
-    };
-    fields.end("the end of the map behind its fourth number")?;
-    Map::new(size, delivery).map_err(|error| MapStringError::Map {
-        column: match error {
-            MapError::Empty { .. } => at_size.column(),
-            MapError::Delivery { .. } => at_delivery.column(),
+    let delivery = [
+        "the x of the delivery, 0 to 255",
+        "the y of the delivery, 0 to 255",
+    ];
+    let map = grid(
+        || fields.next(),
+        delivery,
+        |column, error| MapStringError::Map {
+            column,
+            error: error.into(),
         },
-        error,
-    })
+    )?;
+    fields.end("the end of the map behind its fourth number")?;
+    Ok(map)
 }
 
 /// A product with a number or a name.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Good {
     label: String,
-    /// The square it stands in.
-    pub square: Coord,
-    /// The side of the square from which it is reached.
-    pub side: Direction,
+    /// The square in which it stands.
+    pub square: Node,
+    /// The side of the square from which the robot reaches it.
+    pub side: Heading,
 }
 
 /// Why a text cannot stand for a product.
@@ -124,16 +113,12 @@ pub struct LabelError {
 }
 
 impl Good {
-    /// A product called `label`.
+    /// A product with the number or name `label`.
     ///
     /// # Errors
     ///
-    /// When the label is empty, has a blank at an end, or has a comma, a semicolon or a line break.
-    pub fn new(
-        label: impl Into<String>,
-        square: Coord,
-        side: Direction,
-    ) -> Result<Self, LabelError> {
+    /// The label is empty, has a blank at an end, or has a comma, a semicolon or a line break.
+    pub fn new(label: impl Into<String>, square: Node, side: Heading) -> Result<Self, LabelError> {
         let label = label.into();
         check_label(&label)?;
         Ok(Self {
@@ -150,7 +135,7 @@ impl Good {
 
     /// Its number, if it has one.
     pub fn id(&self) -> Option<ProductId> {
-        ProductId::from_word(Reader::whole(&self.label)).ok()
+        product(&self.label)
     }
 }
 
@@ -168,14 +153,14 @@ impl fmt::Display for Good {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             label,
-            square: Coord { x, y },
+            square: Node { x, y },
             side,
         } = self;
         write!(formatter, "{label},{x},{y},{}", side.number())
     }
 }
 
-/// Finds out whether a text can stand for a product.
+/// Checks whether a text can stand for a product.
 pub(crate) fn check_label(label: &str) -> Result<(), LabelError> {
     let blank = [' ', '\t'];
     let is_bare = !label.starts_with(blank) && !label.ends_with(blank);
@@ -190,13 +175,13 @@ pub(crate) fn check_label(label: &str) -> Result<(), LabelError> {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Goods(pub Vec<Good>);
 
-/// Why a string lists no goods.
+/// Why a string is not a list of goods.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum GoodsError {
-    /// Something else stands there than belongs there.
+    /// A field is wrong.
     #[error(transparent)]
     Misread(#[from] Misread),
-    /// The product before the first comma cannot be called so.
+    /// The text before a first comma cannot stand for a product.
     #[error("column {column}: {error}")]
     Label {
         /// Where it begins, in characters from 1.
@@ -206,7 +191,7 @@ pub enum GoodsError {
     },
 }
 
-/// Why goods are not products of GaG's grammar.
+/// Why GaG's grammar cannot list these goods.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum TranslateError {
     /// A product has a name and no number (AMB-38).
@@ -215,9 +200,9 @@ pub enum TranslateError {
         /// The name.
         label: String,
     },
-    /// This is no list of products.
+    /// Such a list of products cannot exist.
     #[error(transparent)]
-    Products(#[from] ProductsError),
+    Products(#[from] Reason),
 }
 
 impl Goods {
@@ -225,7 +210,7 @@ impl Goods {
     ///
     /// # Errors
     ///
-    /// When a product has not four fields or one of them is not what belongs there.
+    /// A product does not have four fields, or one of them is wrong.
     pub fn read(text: &str) -> Result<Self, GoodsError> {
         let whole = Reader::whole(text).trimmed();
         let whole = whole.without_last(';');
@@ -236,11 +221,11 @@ impl Goods {
         goods.map(Self)
     }
 
-    /// The same as GaG's grammar has it (AMB-39).
+    /// The same list in the form of GaG's grammar (AMB-39).
     ///
     /// # Errors
     ///
-    /// When a product has a name, or two have the same number.
+    /// A product has a name, or two have the same number.
     pub fn products(&self) -> Result<Products, TranslateError> {
         let product = |good: &Good| match good.id() {
             Some(id) => Ok(Product {
@@ -253,7 +238,7 @@ impl Goods {
             }),
         };
         let products: Result<_, _> = self.0.iter().map(product).collect();
-        Ok(Products::new(products?)?)
+        Ok(Products::new(products?).map_err(Reason::from)?)
     }
 }
 
@@ -278,7 +263,7 @@ impl fmt::Display for Goods {
 fn read_good(text: Word<'_>) -> Result<Good, GoodsError> {
     let mut fields = fields_of(text);
     let label = fields.next();
-    let square = Coord {
+    let square = Node {
         x: fields
             .next()
             .number("the x of its square, 0 to 255", 0, 255)?,
@@ -289,7 +274,7 @@ fn read_good(text: Word<'_>) -> Result<Good, GoodsError> {
     let side = fields.next();
     let wanted = "a side from 0 to 3";
     let number = side.number(wanted, 0, 3)?;
-    let side = side.read(wanted, |_| Direction::from_number(number))?;
+    let side = side.read(wanted, |_| Heading::from_number(number))?;
     fields.end("the end of the product behind its side")?;
     Good::new(label.text, square, side).map_err(|error| GoodsError::Label {
         column: label.column(),
@@ -299,26 +284,22 @@ fn read_good(text: Word<'_>) -> Result<Good, GoodsError> {
 
 /// The fields of a string with commas between them.
 struct Fields<'a, I: Iterator<Item = Word<'a>>> {
-    parts: core::iter::Peekable<I>,
+    parts: I,
     /// The empty place behind the last field.
     end: Word<'a>,
 }
 
 fn fields_of<'a>(text: Word<'a>) -> Fields<'a, impl Iterator<Item = Word<'a>>> {
     Fields {
-        parts: text.parts(',').peekable(),
+        parts: text.parts(','),
         end: text.end(),
     }
 }
 
 impl<'a, I: Iterator<Item = Word<'a>>> Fields<'a, I> {
-    /// The next field without blanks around it; an empty one behind the last.
+    /// The next field without blanks around it; after the last one an empty field.
     fn next(&mut self) -> Word<'a> {
         self.parts.next().unwrap_or(self.end).trimmed()
-    }
-
-    fn ahead(&mut self) -> Word<'a> {
-        self.parts.peek().copied().unwrap_or(self.end).trimmed()
     }
 
     fn end(mut self, wanted: &'static str) -> Result<(), Misread> {

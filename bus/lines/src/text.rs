@@ -1,11 +1,11 @@
-//! Free text and names, such as stand at a line's end or as one of its words.
+//! Free text at the end of a line, and names, which are single words.
 
 use core::fmt;
 
 use thiserror::Error;
 
-/// Any text without a line break. It may hold other control characters: whoever shows it in a
-/// terminal escapes them.
+/// Any text without a line break. It may hold other control characters, so a program that shows it
+/// in a terminal must escape them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Text(String);
 
@@ -21,11 +21,11 @@ pub enum TextError {
 }
 
 impl Text {
-    /// The text as it is.
+    /// The text, unchanged.
     ///
     /// # Errors
     ///
-    /// When it has a CR or an LF.
+    /// It has a CR or an LF.
     pub fn new(text: impl Into<String>) -> Result<Self, TextError> {
         let text = text.into();
         match text
@@ -49,7 +49,7 @@ impl fmt::Display for Text {
     }
 }
 
-/// A name: 1 to 32 of `a`-`z`, `0`-`9`, `-` and `_`. The names of robots are names.
+/// A name: 1 to 32 of `a`-`z`, `0`-`9`, `-` and `_`. Names of robots have this form.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Name(String);
 
@@ -62,7 +62,7 @@ pub enum NameError {
         /// Its length in characters.
         length: usize,
     },
-    /// A character that names do not have.
+    /// It has a character that names may not have.
     #[error("column {column}: {found:?} stands here; a name is made of a-z, 0-9, - and _")]
     Character {
         /// Where, in characters from 1.
@@ -77,11 +77,11 @@ impl Name {
     pub const MAX_LENGTH: usize = 32;
     pub(crate) const WANTED: &str = "a name of 1 to 32 of a-z, 0-9, - and _";
 
-    /// The name, if it is one.
+    /// The text as a name.
     ///
     /// # Errors
     ///
-    /// When it is too short, too long or has other characters.
+    /// It is too short, too long or has other characters.
     pub fn new(name: impl Into<String>) -> Result<Self, NameError> {
         let name = name.into();
         let allowed = |found: char| matches!(found, 'a'..='z' | '0'..='9' | '-' | '_');

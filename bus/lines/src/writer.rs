@@ -1,4 +1,4 @@
-//! The one place where a value becomes a line with its end.
+//! Turns a value into a line with its end. Only this file does that.
 
 use core::fmt::{self, Write as _};
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 /// The most bytes a line has without its end.
 pub const MAX_LINE: usize = 1024;
 
-/// A value that does not fit in one line. A list is made shorter, a text is cut.
+/// A value that does not fit in one line. The caller must shorten the list or cut the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("this would be a line of {length} bytes; at most {MAX_LINE} are allowed, so say less")]
 pub struct TooLong {
@@ -15,7 +15,7 @@ pub struct TooLong {
     pub length: usize,
 }
 
-/// The line that says `value`, with LF at its end.
+/// The line for `value`, with LF at its end.
 ///
 /// ```
 /// use lager_lines::{gag::Answer, to_line};
@@ -26,7 +26,7 @@ pub struct TooLong {
 ///
 /// # Errors
 ///
-/// When the line would be longer than [`MAX_LINE`] bytes.
+/// The line would be longer than [`MAX_LINE`] bytes.
 pub fn to_line(value: &impl fmt::Display) -> Result<String, TooLong> {
     let mut line = Bounded::default();
     // Only `Display` itself could fail, and none of this crate's does.
@@ -40,7 +40,7 @@ pub fn to_line(value: &impl fmt::Display) -> Result<String, TooLong> {
     Ok(line.text)
 }
 
-/// Text that counts on, but keeps no more than a line.
+/// Keeps at most a line of text, and counts the bytes beyond.
 #[derive(Default)]
 struct Bounded {
     text: String,

@@ -1,21 +1,21 @@
-//! Acts on each change of the weather as soon as it is published.
+//! Example: acts on each change of the weather as soon as it is published.
 
 mod weather;
 
 use std::{error::Error, time::Duration};
 
-use lager_ports::{Bus, BusConfig, Policy};
-use lager_topics::Role;
-use weather::WeatherNow;
+use lager_ports::{Bus, BusConfig};
+use lager_wake::Policy;
+use weather::{SAILOR, WEATHER, WeatherNow};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).map(Into::into);
     let bus = Bus::open(
         &BusConfig {
             folder,
-            ..BusConfig::default()
+            ..BusConfig::of(&WEATHER)
         },
-        Role::Guest,
+        SAILOR,
     )?;
     let waiter = bus.waiter(Policy::Block)?;
     let mut weather = bus.subscriber::<WeatherNow>()?;

@@ -1,21 +1,24 @@
-//! Looks at the weather now and then, and never slows its publisher.
+//! Example: looks at the weather now and then and never slows down its publisher.
 
 mod weather;
 
 use std::{error::Error, thread::sleep, time::Duration};
 
 use lager_ports::{Bus, BusConfig};
-use lager_topics::Role;
-use weather::WeatherNow;
+use lager_sample::Part;
+use weather::{WEATHER, WeatherNow};
+
+/// The part of a process that only looks.
+const ONLOOKER: Part = Part::new(14, "onlooker").observing();
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).map(Into::into);
     let bus = Bus::open(
         &BusConfig {
             folder,
-            ..BusConfig::default()
+            ..BusConfig::of(&WEATHER)
         },
-        Role::Observer,
+        ONLOOKER,
     )?;
     let mut weather = bus.subscriber::<WeatherNow>()?;
     loop {

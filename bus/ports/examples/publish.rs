@@ -5,17 +5,20 @@ mod weather;
 use std::{error::Error, thread::sleep, time::Duration};
 
 use lager_ports::{Bus, BusConfig};
-use lager_topics::Role;
-use weather::WeatherNow;
+use lager_sample::Part;
+use weather::{WEATHER, WeatherNow};
+
+/// The part of the process that measures the weather.
+const STATION: Part = Part::new(12, "station");
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).map(Into::into);
     let bus = Bus::open(
         &BusConfig {
             folder,
-            ..BusConfig::default()
+            ..BusConfig::of(&WEATHER)
         },
-        Role::Guest,
+        STATION,
     )?;
     let weather = bus.publisher::<WeatherNow>()?;
     for wind in 0.. {

@@ -1,73 +1,98 @@
-//! Writing any topic by its name, for tools that are given payloads as text or as recorded: of the
-//! table, or one that this process was not built with and somebody has open.
+//! Writes samples to any topic by its name. For tools that send typed or recorded payloads. The
+//! topic is in the application's table, or else another process has it open.
 
 use core::fmt;
 
-use lager_topics::{Description, Stamp, Topic, TopicVisitor, bytes_of, visit};
+use lager_home::Clock;
+use lager_sample::{Description, Stamp};
 
 use crate::bus::Bus;
 use crate::cause::Cause;
-use crate::clock::Clock;
 use crate::error::{PortError, SendError};
-use crate::publisher::Publisher;
-use crate::untyped::Foreign;
+use crate::kind::Kind;
+use crate::untyped::{Foreign, Lent, To, Writer};
 
-/// The writing end of a topic by its name; stays in the thread that made it.
+/// The writing end of a topic given by its name; stays in the thread that made it.
 pub struct AnyPublisher {
     name: String,
     description: Description,
-    blank: Box<[u8]>,
-    end: Box<dyn End>,
+    blank: Vec<u8>,
+    holds: bool,
+    end: End,
+}
+
+/// The writer that takes the payload's bytes.
+enum End {
+    /// For a topic in the application's table.
+    Known(Box<Writer>),
+    /// For a topic that is not in the table.
+    Foreign(Foreign),
 }
 
 impl AnyPublisher {
-    /// `None` if the topic is in no table and no process has it open.
+    /// `None` if the topic is not in the table and no process has it open.
     pub(crate) fn new(bus: &Bus, name: &str) -> Result<Option<Self>, PortError> {
-        if let Ok(opened) = visit(name, Open { bus }) {
-            return opened.map(Some);
+        if let Some(entry) = bus.application().entry(name) {
+            let kind = Kind::of_entry(entry);
+            return Ok(Some(Self {
+                name: name.to_owned(),
+                description: Description::of_make(&kind.make()),
+                blank: (entry.blank)(),
+                holds: kind.qos.history > 0,
+                end: End::Known(Box::new(Writer::new(bus, &kind)?)),
+            }));
         }
         let found = Foreign::new(bus, name)?;
         Ok(found.map(|(end, description)| Self {
             name: name.to_owned(),
-            // Nobody says what a field has that was never written.
-            blank: vec![0; description.size()].into(),
+            // Such a topic states no default values, so a field that nobody writes is 0.
+            blank: vec![0; description.size()],
             description,
-            end: Box::new(end),
+            holds: end.holds,
+            end: End::Foreign(end),
         }))
     }
 
-    /// The topic's name behind `lager/<robot>/`.
+    /// The topic's name behind `<family>/<unit>/`.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// How its samples are laid out.
+    /// The layout of the topic's samples.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// The bytes of a payload of which no field was written.
+    /// The bytes of a payload in which no field has been written.
     pub fn blank(&self) -> &[u8] {
         &self.blank
     }
 
-    /// Whether the topic holds its last sample for those who come later.
+    /// Whether the topic keeps its last sample for readers that come later.
     pub fn holds(&self) -> bool {
-        self.end.holds()
+        self.holds
     }
 
-    /// Sends a payload as of now, and rings those who act on the topic.
+    /// Sends a payload, stamped with the present time, and rings the topic's actors.
     ///
     /// # Errors
-    /// As [`Publisher::send`].
+    /// As [`Publisher::send`](crate::Publisher::send).
     ///
     /// # Panics
-    /// When there are not as many bytes as [`AnyPublisher::blank`] has.
+    /// If `payload` has not as many bytes as [`AnyPublisher::blank`].
     pub fn send(&self, payload: &[u8]) -> Result<(), SendError> {
-        self.end.send(payload)
+        let now_ns = Clock::monotonic_ns();
+        match &self.end {
+            End::Known(writer) => {
+                let lent = self.filled(writer, payload)?;
+                writer.deliver(lent, Cause::OWN, now_ns, To::All)
+            }
+            End::Foreign(end) => end.send(payload, now_ns),
+        }
     }
 
-    /// Sends a recorded payload with the stamp that it had, as [`Publisher::replay`].
+    /// Sends a recorded payload with its recorded stamp, as
+    /// [`Publisher::replay`](crate::Publisher::replay) does.
     ///
     /// # Errors
     /// As [`AnyPublisher::send`].
@@ -75,12 +100,28 @@ impl AnyPublisher {
     /// # Panics
     /// As [`AnyPublisher::send`].
     pub fn replay(&self, payload: &[u8], stamp: Stamp) -> Result<(), SendError> {
-        self.end.replay(payload, stamp)
+        match &self.end {
+            End::Known(writer) => {
+                let lent = self.filled(writer, payload)?;
+                writer.deliver_stamped(lent, stamp, To::All)
+            }
+            End::Foreign(end) => end.deliver(payload, stamp),
+        }
     }
 
-    /// Gives readers that have come since the last sample their history.
+    /// Sends their history to readers that have come since the last sample.
     pub fn tick(&self) {
-        self.end.tick();
+        match &self.end {
+            End::Known(writer) => writer.tick(),
+            End::Foreign(end) => end.tick(),
+        }
+    }
+
+    fn filled(&self, writer: &Writer, payload: &[u8]) -> Result<Lent, SendError> {
+        assert_eq!(payload.len(), self.blank.len(), "a payload's bytes");
+        let lent = writer.lend()?;
+        lent.fill(payload);
+        Ok(lent)
     }
 }
 
@@ -90,87 +131,5 @@ impl fmt::Debug for AnyPublisher {
             .debug_struct("AnyPublisher")
             .field("name", &self.name)
             .finish_non_exhaustive()
-    }
-}
-
-struct Open<'a> {
-    bus: &'a Bus,
-}
-
-impl TopicVisitor for Open<'_> {
-    type Output = Result<AnyPublisher, PortError>;
-
-    fn visit<T: Topic>(self) -> Self::Output {
-        Ok(AnyPublisher {
-            name: T::NAME.to_owned(),
-            description: Description::of::<T::Payload>(),
-            blank: bytes_of(&T::Payload::default()).into(),
-            end: Box::new(Publisher::<T>::new(self.bus)?),
-        })
-    }
-}
-
-/// What takes the bytes.
-trait End {
-    fn send(&self, payload: &[u8]) -> Result<(), SendError>;
-
-    fn replay(&self, payload: &[u8], stamp: Stamp) -> Result<(), SendError>;
-
-    fn tick(&self);
-
-    fn holds(&self) -> bool;
-}
-
-impl<T: Topic> End for Publisher<T> {
-    fn send(&self, payload: &[u8]) -> Result<(), SendError> {
-        Self::send(self, Cause::OWN, typed::<T>(payload))
-    }
-
-    fn replay(&self, payload: &[u8], stamp: Stamp) -> Result<(), SendError> {
-        Self::replay(self, typed::<T>(payload), stamp)
-    }
-
-    fn tick(&self) {
-        Self::tick(self);
-    }
-
-    fn holds(&self) -> bool {
-        T::QOS.history > 0
-    }
-}
-
-/// The payload that these bytes are.
-#[allow(unsafe_code, reason = "bytes are read as a payload")]
-fn typed<T: Topic>(payload: &[u8]) -> T::Payload {
-    assert_eq!(payload.len(), size_of::<T::Payload>(), "a payload's bytes");
-    // SAFETY: there are as many bytes as a payload has, and any bits are one (`Field`).
-    unsafe { payload.as_ptr().cast::<T::Payload>().read_unaligned() }
-}
-
-impl End for Foreign {
-    fn send(&self, payload: &[u8]) -> Result<(), SendError> {
-        let sequence = self.next_sequence.get();
-        self.next_sequence.set(sequence + 1);
-        let publish_time_ns = Clock::monotonic_ns();
-        let stamp = Cause::OWN.stamp(Stamp {
-            sequence,
-            publish_time_ns,
-            epoch: self.epoch,
-            writer: std::process::id(),
-            ..Stamp::default()
-        });
-        self.deliver(payload, stamp)
-    }
-
-    fn replay(&self, payload: &[u8], stamp: Stamp) -> Result<(), SendError> {
-        self.deliver(payload, stamp)
-    }
-
-    fn tick(&self) {
-        Self::tick(self);
-    }
-
-    fn holds(&self) -> bool {
-        self.holds
     }
 }

@@ -1,4 +1,4 @@
-//! A process's membership on the bus.
+//! [`Bus`]: a process's membership on the bus. Every process opens one and makes its ports from it.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,25 +8,20 @@ use iceoryx2::node::NodeCreationFailure;
 use iceoryx2::prelude::{
     LogLevel, Node, NodeBuilder, NodeName, PortName, SignalHandlingMode, set_log_level,
 };
-use lager_topics::Role;
+use lager_home::{Clock, ClockSource, Descriptions, Home, Shortage, UnitName};
+use lager_sample::{Application, Part};
+use lager_wake::Board;
 
-use crate::clock::{self, Clock};
 use crate::config::BusConfig;
-use crate::descriptions::Descriptions;
-use crate::doorbell::{self, Board};
 use crate::error::OpenError;
 use crate::here::Here;
-use crate::mend;
-use crate::name::{self, RobotName};
-use crate::place::Place;
-use crate::shortage::Shortage;
+use crate::name;
 use crate::sweep;
 use crate::transport::Ipc;
 
 /// A process's membership on the bus; clones share it.
 ///
-/// It may be sent to any thread. Ports are made from it in the thread that uses them and stay
-/// there.
+/// It may be sent to any thread. The ports made from it stay in the thread that makes them.
 #[derive(Clone)]
 pub struct Bus {
     shared: Arc<Shared>,
@@ -34,53 +29,60 @@ pub struct Bus {
 
 struct Shared {
     node: Here<Node<Ipc>>,
-    place: Place,
+    home: Home,
     config: Config,
-    robot: RobotName,
-    role: Role,
-    clock: clock::Source,
+    application: &'static Application,
+    unit: UnitName,
+    part: Part,
+    clock: ClockSource,
     port_name: PortName,
     board: Board,
-    /// As they were at the last look.
+    /// The descriptions that processes stated when they were last read.
     descriptions: Mutex<Descriptions>,
 }
 
 impl Bus {
-    /// Joins the bus as `role`, after sweeping what killed processes left behind.
+    /// Joins the bus as `part`, after sweeping what killed processes left behind.
     ///
-    /// No signal handler is installed.
+    /// Installs no signal handler.
     ///
     /// # Errors
-    /// The configuration is not usable, or the bus's files or the body's clock are not.
-    pub fn open(config: &BusConfig, role: Role) -> Result<Self, OpenError> {
-        // Half a bus would be made, which looks damaged to everybody else.
+    /// The configuration, the bus's files or the unit's clock cannot be used.
+    pub fn open(config: &BusConfig, part: impl Into<Part>) -> Result<Self, OpenError> {
+        Self::join(config, part.into())
+    }
+
+    fn join(config: &BusConfig, part: Part) -> Result<Self, OpenError> {
+        // If files may not become long enough for a port (ulimit -f), this process would create
+        // half a bus, and every other process would take it for damaged.
         if let Some(shortage) = Shortage::of_any_port() {
             return Err(OpenError::Short(shortage));
         }
-        let place = config.place()?;
-        let transport = config.transport(&place)?;
-        let clock = clock::Source::new(config.speed, config.clock.as_deref())?;
+        let home = config.home()?;
+        let transport = config.transport(&home)?;
+        let clock = ClockSource::new(config.speed, config.clock.as_deref())?;
         set_log_level(log_level());
-        // Before anything is opened that could be waited for.
-        mend::refuse_foreign(&place)?;
+        // First, because opening a file of another user could wait without end.
+        lager_home::refuse_foreign(&home)?;
         let mut descriptions = Descriptions::default();
-        mend::unfinished(&place, &mut descriptions);
-        let node = make_node(&transport, &place, &config.robot, role)?;
-        mend::protect(&place);
-        // What cannot be listed now is left to the next sweep.
+        lager_home::unfinished(&home, &mut descriptions);
+        let node = make_node(&transport, &home, config, part)?;
+        lager_home::protect(&home);
+        // The next sweep finds the processes that cannot be listed now.
         let _ = sweep::dead_nodes(&transport);
-        doorbell::sweep_all(&place);
-        place.sweep_locks();
-        let port_name = PortName::new(&name::port(role, std::process::id()))
-            .expect("a role and a number fit into a port's name");
+        lager_wake::sweep_all(&home);
+        home.sweep_locks();
+        let port_name = PortName::new(&name::port(part, std::process::id()))
+            .expect("a part and a number fit into a port's name");
         Ok(Self {
             shared: Arc::new(Shared {
                 node: Here::new(node),
-                board: Board::of(&place, &config.robot),
-                place,
+                board: Board::of(&home, &config.unit),
+                home,
                 config: transport,
-                robot: config.robot.clone(),
-                role,
+                application: config.application,
+                unit: config.unit.clone(),
+                part,
                 clock,
                 port_name,
                 descriptions: Mutex::new(descriptions),
@@ -88,42 +90,46 @@ impl Bus {
         })
     }
 
-    /// A clock that shows the robot's time.
+    /// A clock that shows the unit's time.
     pub fn clock(&self) -> Clock {
-        Clock::new(self.shared.clock.clone())
+        Clock::new(&self.shared.clock)
     }
 
-    /// The robot's name.
-    pub fn robot(&self) -> &RobotName {
-        &self.shared.robot
+    /// The unit's name.
+    pub fn unit(&self) -> &UnitName {
+        &self.shared.unit
     }
 
-    /// Where the bus lives.
-    pub fn place(&self) -> &Place {
-        &self.shared.place
+    /// The folder and the names of this bus.
+    pub fn home(&self) -> &Home {
+        &self.shared.home
     }
 
-    /// What this process is on the bus.
-    pub fn role(&self) -> Role {
-        self.shared.role
+    /// The application to which this bus belongs.
+    pub fn application(&self) -> &'static Application {
+        self.shared.application
     }
 
-    /// Removes what killed processes left behind, and returns how many processes there were. If
-    /// another process is sweeping at the same moment, this waits for it, at most 100 ms for each
-    /// dead process.
+    /// The part that this process plays on the bus.
+    pub fn part(&self) -> Part {
+        self.shared.part
+    }
+
+    /// Removes what killed processes left behind, and returns the number of these processes. If
+    /// another process is sweeping, this call waits for it, at most 100 ms for each dead process.
     ///
-    /// Samples a killed writer has sent stay with subscribers that have received from it before,
-    /// until they are drained; a keeper should still drain first ([`crate::Keeper::remember`]).
+    /// A reader keeps the unread samples of a killed writer from which it has received before. A
+    /// keeper must still receive them before it sweeps ([`crate::Keeper::remember`]).
     pub fn sweep(&self) -> usize {
-        mend::unfinished(&self.shared.place, &mut self.descriptions());
-        doorbell::sweep(&self.shared.place, &self.shared.robot);
+        lager_home::unfinished(&self.shared.home, &mut self.descriptions());
+        lager_wake::sweep(&self.shared.home, &self.shared.unit);
         sweep::dead_nodes(&self.shared.config).unwrap_or_default()
     }
 
     /// Whether others can still find this process on the bus. They cannot after the bus was
     /// cleared, or after its files were removed.
     pub fn is_listed(&self) -> bool {
-        self.shared.place.is_current() && sweep::is_listed(&self.shared.config, &self.shared.node)
+        self.shared.home.is_current() && sweep::is_listed(&self.shared.config, &self.shared.node)
     }
 
     pub(crate) fn node(&self) -> &Node<Ipc> {
@@ -152,20 +158,20 @@ impl fmt::Debug for Bus {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter
             .debug_struct("Bus")
-            .field("robot", &self.shared.robot)
-            .field("role", &self.shared.role)
+            .field("unit", &self.shared.unit)
+            .field("part", &self.shared.part)
             .finish_non_exhaustive()
     }
 }
 
 fn make_node(
     config: &Config,
-    place: &Place,
-    robot: &RobotName,
-    role: Role,
+    home: &Home,
+    bus: &BusConfig,
+    part: Part,
 ) -> Result<Node<Ipc>, OpenError> {
-    let name = NodeName::new(&name::node(robot, role, std::process::id()))
-        .expect("robot, role and number fit into a node's name");
+    let name = name::node(bus.application, &bus.unit, part, std::process::id());
+    let name = NodeName::new(&name).expect("all of it fits into a node's name");
     NodeBuilder::new()
         .name(&name)
         .config(config)
@@ -175,7 +181,7 @@ fn make_node(
             if let Some(shortage) = Shortage::now() {
                 return OpenError::Short(shortage);
             }
-            let folder = place.folder().to_owned();
+            let folder = home.folder().to_owned();
             match failure {
                 NodeCreationFailure::InsufficientPermissions => OpenError::Permission { folder },
                 other => OpenError::Transport {

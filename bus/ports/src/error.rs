@@ -1,100 +1,32 @@
-//! What can go wrong, one enum per operation; every message says what to do.
+//! The errors of this crate, one enum for each operation. Every message says what to do.
 
-use std::io::{Error, ErrorKind};
-use std::path::{Path, PathBuf};
+use std::io::ErrorKind;
+use std::path::PathBuf;
 
-use lager_topics::Role;
+use lager_home::{ClockError, HomeError, Shortage};
+use lager_sample::Part;
+use lager_wake::BoardFault;
 
 use crate::fault::{Difference, TransportFault};
-use crate::shortage::Shortage;
 
 /// Why a process could not join the bus.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OpenError {
-    /// The folder is not an absolute path.
-    #[error("`{0}` cannot be the bus's folder; give an absolute path, in UTF-8")]
-    RelativeFolder(PathBuf),
-    /// The folder leaves no room for the names of sockets.
-    #[error("the bus's folder {folder} is too long; use at most {limit} bytes")]
-    FolderTooLong {
-        /// The folder.
-        folder: PathBuf,
-        /// The longest that works, in bytes.
-        limit: usize,
-    },
-    /// A file or a link.
-    #[error(
-        "{0} is a file or a symbolic link and cannot be the bus's folder; remove it, or name a folder with --bus"
-    )]
-    NoFolder(PathBuf),
-    /// Another user's.
-    #[error(
-        "{folder} belongs to UID {uid} ({name}); use `sudo -u {name} lager ...` for that user's robots, or name another folder with --bus"
-    )]
-    ForeignFolder {
-        /// The folder.
-        folder: PathBuf,
-        /// Its owner.
-        uid: u32,
-        /// The owner as `sudo -u` knows him.
-        name: String,
-    },
-    /// Other users may enter it.
-    #[error(
-        "other users may enter the bus's folder {folder} (mode {mode:04o}); use `chmod 700 {folder}`, if nobody else's files are in it"
-    )]
-    SharedFolder {
-        /// The folder.
-        folder: PathBuf,
-        /// Its mode.
-        mode: u32,
-    },
-    /// Another user has put a segment where the bus's are.
-    #[error(
-        "{path} belongs to UID {uid} ({name}), who could end every process of this bus with it; remove it (`sudo rm {path}`), or name another folder with --bus"
-    )]
-    ForeignSegment {
-        /// The segment.
-        path: PathBuf,
-        /// Its owner.
-        uid: u32,
-        /// The owner's name.
-        name: String,
-    },
-    /// It cannot be made or looked at.
-    #[error(
-        "the bus's folder {folder} cannot be used ({detail}); make it for this user, or name another one with --bus"
-    )]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// What the system says.
-        detail: String,
-    },
+    /// The folder in which the bus lives cannot be used.
+    #[error(transparent)]
+    Home(#[from] HomeError),
+    /// The body's clock page cannot be used.
+    #[error(transparent)]
+    Clock(#[from] ClockError),
     /// This process or this machine has run out of something.
     #[error("the bus could not be opened: {0}")]
     Short(Shortage),
     /// The speed is not a positive number.
-    #[error("a robot cannot live {0} times as fast as real time; give a positive number")]
+    #[error("no clock runs {0} times as fast as real time; give a positive number")]
     Speed(f64),
-    /// The body's clock page cannot be read.
-    #[error(
-        "the clock page {path} cannot be read ({detail}); the emulated boards publish it: is the robot up, and with `--body chip`?"
-    )]
-    NoClock {
-        /// The page's file.
-        path: PathBuf,
-        /// What the system says.
-        detail: String,
-    },
-    /// The clock's file is something else.
-    #[error(
-        "{0} is no clock page, or one of another build; name the file that the emulator was given with --clock"
-    )]
-    ForeignClock(PathBuf),
     /// The user may not write where the bus lives.
     #[error(
-        "no permission to use the bus's files in {folder} and /dev/shm; run all of a robot's processes as one user, or remove files left by another user"
+        "no permission to use the bus's files in {folder} and /dev/shm; run all processes of a bus as one user, or remove files left by another user"
     )]
     Permission {
         /// The bus's folder.
@@ -115,9 +47,6 @@ pub enum OpenError {
 /// Why a port could not be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
-    /// The bridge cannot use its stop word.
-    #[error(transparent)]
-    Stop(#[from] StopError),
     /// All places for observers are taken.
     #[error(
         "`{topic}` already has {limit} observers, which is the limit; stop one of them (`lager topic info {topic}` lists them) and try again"
@@ -140,12 +69,12 @@ pub enum PortError {
     },
     /// All places on the bell board are taken.
     #[error(
-        "{role} is already waited for {limit} times, which is the limit; stop a {role} that runs twice and try again"
+        "{part} already has {limit} waiters, which is the limit; stop a {part} that runs twice and try again"
     )]
     TooManyWaiters {
-        /// The role.
-        role: Role,
-        /// Places for waiters of one role.
+        /// The part.
+        part: Part,
+        /// Places for waiters of one part.
         limit: usize,
     },
     /// All places for writers are taken.
@@ -168,7 +97,7 @@ pub enum PortError {
     },
     /// A running process uses another layout or other limits.
     #[error(
-        "`{topic}` is in use with another layout or other limits ({difference}): a process of another build of lager is running; stop all processes of this robot, bring them to one build and start them again"
+        "`{topic}` is in use with another layout or other limits ({difference}): a process of another build of lager is running; stop all processes that use it, bring them to one build and start them again"
     )]
     OtherLayout {
         /// The topic or request.
@@ -194,7 +123,7 @@ pub enum PortError {
     },
     /// The user may not use the shared files.
     #[error(
-        "no permission to use the shared files of `{topic}`; run all of a robot's processes as one user"
+        "no permission to use the shared files of `{topic}`; run all processes of a bus as one user"
     )]
     Permission {
         /// The topic or request.
@@ -207,7 +136,7 @@ pub enum PortError {
     Busy {
         /// The topic or request.
         topic: String,
-        /// What was met last.
+        /// The fault of the last attempt.
         fault: TransportFault,
     },
     /// This process or this machine has run out of something.
@@ -215,24 +144,24 @@ pub enum PortError {
     Short {
         /// The topic or request.
         topic: String,
-        /// What there is too little of.
+        /// The resource of which there is too little.
         shortage: Shortage,
     },
-    /// A part of the service that has a thread of its own could not be started.
+    /// The thread of a part of this service could not be started.
     #[error(
-        "there is no thread for {what} ({fault}); the limit of processes (ulimit -u) or of memory (ulimit -v) is reached"
+        "the system has no thread for {what} ({fault}); the limit of processes (ulimit -u) or of memory (ulimit -v) is reached"
     )]
     Thread {
-        /// What it would do.
+        /// What the thread was to do.
         what: &'static str,
-        /// What the system says.
+        /// The fault that the system reports.
         fault: TransportFault,
     },
-    /// Only services that act on a topic may wait.
-    #[error("{role} is not woken by any topic: observers poll on a timer")]
+    /// Observers may not wait: only the actors of a topic are woken.
+    #[error("{part} is not woken by any topic: observers poll on a timer")]
     NotAnActor {
-        /// The role.
-        role: Role,
+        /// The part.
+        part: Part,
     },
     /// The transport failed.
     #[error(
@@ -246,6 +175,34 @@ pub enum PortError {
     },
 }
 
+impl PortError {
+    /// The error of a bell of `part`, if the board of bells cannot be used.
+    pub(crate) fn of_bell(part: Part, fault: BoardFault) -> Self {
+        let topic = format!("bell of {part}");
+        match fault {
+            BoardFault::OtherLayout => Self::OtherLayout {
+                topic,
+                difference: Difference::Board,
+            },
+            BoardFault::Busy => Self::Busy {
+                topic,
+                fault: TransportFault::InMotion,
+            },
+            BoardFault::NoSeat => Self::TooManyWaiters {
+                part,
+                limit: lager_wake::SEATS_PER_PART,
+            },
+            BoardFault::File(error) if error.kind() == ErrorKind::PermissionDenied => {
+                Self::Permission { topic }
+            }
+            BoardFault::File(error) => Self::Transport {
+                topic,
+                fault: error.into(),
+            },
+        }
+    }
+}
+
 /// Why a sample was not sent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
@@ -255,7 +212,7 @@ pub enum SendError {
         /// Loans at the same time.
         limit: usize,
     },
-    /// The transport failed; the sample is counted as lost by its readers.
+    /// The transport failed. The sample's readers count it as lost.
     #[error("the sample could not be sent ({0}); if it happens again, restart this service")]
     Transport(#[from] TransportFault),
 }
@@ -263,10 +220,10 @@ pub enum SendError {
 /// Why a sample could not be received.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReceiveError {
-    /// Too many samples are held.
+    /// This reader holds too many samples.
     #[error("{limit} samples are held; drop one before receiving the next")]
     TooManyHeld {
-        /// Samples at the same time.
+        /// How many it may hold at the same time.
         limit: usize,
     },
     /// The transport failed.
@@ -277,21 +234,21 @@ pub enum ReceiveError {
 /// Why a request was not answered.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
-    /// No process answers such requests.
+    /// No running process answers such requests.
     #[error("{actor} is not running, so nobody answers `{request}`; start it and try again")]
     NoServer {
         /// The request.
         request: &'static str,
-        /// Who would answer.
-        actor: Role,
+        /// The part that answers it.
+        actor: Part,
     },
     /// The answer did not come in time.
     #[error("{actor} did not answer `{request}` in time; it may be restarting, try again")]
     NoAnswer {
         /// The request.
         request: &'static str,
-        /// Who would answer.
-        actor: Role,
+        /// The part that answers it.
+        actor: Part,
     },
     /// The transport failed.
     #[error("`{request}` could not be sent ({fault}); try again")]
@@ -303,10 +260,10 @@ pub enum CallError {
     },
 }
 
-/// Why the bus could not be looked over.
+/// Why this process could not list what is on the bus.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IntrospectError {
-    /// The configuration names no bus.
+    /// The configuration does not describe a usable bus.
     #[error(transparent)]
     Config(#[from] OpenError),
     /// This process or this machine has run out of something.
@@ -318,68 +275,11 @@ pub enum IntrospectError {
 }
 
 impl From<TransportFault> for IntrospectError {
-    /// The transport does not say that it was for want of something.
+    /// The transport does not say whether a resource is used up, so this finds out.
     fn from(fault: TransportFault) -> Self {
         match Shortage::now() {
             Some(shortage) => Self::Short(shortage),
             None => Self::Transport(fault),
-        }
-    }
-}
-
-/// Why the stop word cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum StopError {
-    /// There is no room for the file.
-    #[error(
-        "the stop word {path} has no room: make some (`df {path}` tells where), or switch the robot off at its battery"
-    )]
-    Full {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The user may not.
-    #[error(
-        "this user may not use the stop word {path}: stop the robot as the user who runs it (sudo -u USER)"
-    )]
-    Permission {
-        /// The file.
-        path: PathBuf,
-    },
-    /// No file can be opened.
-    #[error("the stop word {path} cannot be used: {shortage}")]
-    Short {
-        /// The file.
-        path: PathBuf,
-        /// What there is too little of.
-        shortage: Shortage,
-    },
-    /// Anything else the system says.
-    #[error("the stop word {path} cannot be used ({detail}); is its folder there and a folder?")]
-    System {
-        /// The file.
-        path: PathBuf,
-        /// The system's words.
-        detail: String,
-    },
-}
-
-impl StopError {
-    /// What `error` means for the file at `path`.
-    pub(crate) fn new(path: &Path, error: &Error) -> Self {
-        let path = path.to_owned();
-        if let Some(shortage) = Shortage::behind(error) {
-            return Self::Short { path, shortage };
-        }
-        match error.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { path },
-            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-                Self::Permission { path }
-            }
-            _ => Self::System {
-                path,
-                detail: error.to_string(),
-            },
         }
     }
 }

@@ -1,10 +1,11 @@
-//! Every port that a process makes from its bus, in one place.
+//! Makes every kind of port from a process's [`Bus`]: publishers, subscribers, waiters, requests.
 //!
-//! Apart from the [`Bus`] itself, which its ports use and which therefore knows none of them.
+//! It is apart from [`Bus`] because the ports use the bus, so the bus must not depend on the ports.
 
 use core::time::Duration;
 
-use lager_topics::{Request, Stamp, Topic};
+use lager_sample::{Request, Stamp, Topic};
+use lager_wake::{Policy, Waiter};
 
 use crate::any::AnyPublisher;
 use crate::bus::Bus;
@@ -12,68 +13,72 @@ use crate::error::PortError;
 use crate::found::Found;
 use crate::keeper::Keeper;
 use crate::kept::{self, KeptError};
-use crate::policy::Policy;
 use crate::publisher::Publisher;
 use crate::request::{Client, Server};
 use crate::subscriber::Subscriber;
-use crate::waiter::Waiter;
+use crate::untyped::republish_states;
 
 impl Bus {
-    /// A writer of `T`, to be used in this thread. It rings the actors of `T`, now and later.
+    /// A writer of `T`, for this thread. It also rings those actors of `T` that start later.
     ///
     /// # Errors
-    /// Too many writers, a process of another build on the topic, or no resources.
+    /// Too many writers, a process of another build uses the topic, or a resource is used up.
     pub fn publisher<T: Topic>(&self) -> Result<Publisher<T>, PortError> {
         Publisher::new(self)
     }
 
-    /// A reader of `T`, to be used in this thread.
+    /// A reader of `T`, for this thread.
     ///
     /// # Errors
-    /// Too many readers, a process of another build on the topic, or no resources.
+    /// Too many readers, a process of another build uses the topic, or a resource is used up.
     pub fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, PortError> {
         Subscriber::new(self)
     }
 
-    /// A reader of the topic called `name`, which this process need not know; `None` if no process
-    /// has the topic open. To be used in this thread.
+    /// A reader of the topic called `name`, for this thread. The topic need not be in this
+    /// process's table. `None` if no process has the topic open.
     ///
     /// # Errors
-    /// As for a subscriber, or the topic does not describe its samples.
+    /// As for a subscriber, or the topic states no description of its samples.
     pub fn found(&self, name: &str) -> Result<Option<Found>, PortError> {
         Found::new(self, name)
     }
 
-    /// A writer of the topic called `name`: of the table, or of one that this process was not built
-    /// with; `None` if no process has that one open. To be used in this thread.
+    /// A writer of the topic called `name`, for this thread. The topic is in this process's table
+    /// or open in another process; otherwise `None`.
     ///
     /// # Errors
-    /// As for a publisher, or the topic does not describe its samples.
+    /// As for a publisher, or the topic states no description of its samples.
     pub fn any_publisher(&self, name: &str) -> Result<Option<AnyPublisher>, PortError> {
         AnyPublisher::new(self, name)
     }
 
-    /// A waiter, which wakes this process when a topic that it acts on has samples; to be used in
-    /// this thread.
+    /// A waiter, for this thread. It wakes the thread when a topic has samples on which this
+    /// process acts.
     ///
     /// # Errors
-    /// The role acts on nothing, or there are no resources.
+    /// This process is an observer, which cannot wait, or a resource is used up.
     pub fn waiter(&self, policy: Policy) -> Result<Waiter, PortError> {
-        Waiter::new(self, policy)
+        let part = self.part();
+        if part.is_observer() {
+            return Err(PortError::NotAnActor { part });
+        }
+        Waiter::new(self.board(), part, policy, republish_states)
+            .map_err(|fault| PortError::of_bell(part, fault))
     }
 
-    /// The asking side of `R`, to be used in this thread.
+    /// The asking side of `R`, for this thread.
     ///
     /// # Errors
-    /// Too many clients, a process of another build, or no resources.
+    /// Too many clients, a process of another build uses the request, or a resource is used up.
     pub fn client<R: Request>(&self) -> Result<Client<R>, PortError> {
         Client::new(self)
     }
 
-    /// The answering side of `R`, to be used in this thread.
+    /// The answering side of `R`, for this thread.
     ///
     /// # Errors
-    /// Too many servers, a process of another build, or no resources.
+    /// Too many servers, a process of another build uses the request, or a resource is used up.
     pub fn server<R: Request>(&self) -> Result<Server<R>, PortError> {
         Server::new(self)
     }
@@ -86,15 +91,16 @@ impl Bus {
         Keeper::new(self)
     }
 
-    /// The last value, from before this process's restart, of a topic that it writes itself, and the
-    /// stamp that it was published with: how old it is decides what may be taken up. Waits at most
-    /// `timeout` of real time. `None`: the topic can be read, and no value was kept.
+    /// The last value that this process published on a topic before it was restarted, with the
+    /// stamp of that sample. The stamp's age decides whether the process may go on with the value.
+    /// Waits at most `timeout` of real time. `None`: no keeper has a value.
     ///
     /// Call it before making the topic's publisher.
     ///
     /// # Errors
-    /// The topic cannot be read, so it is not known whether a value was kept; faults that pass were
-    /// waited for. A process that must resume from that value must not take this for a first start.
+    /// The topic cannot be read even after several attempts, so it is not known whether a keeper
+    /// has a value. A process that must resume from that value must not take this for its first
+    /// start.
     pub fn kept<T: Topic>(
         &self,
         timeout: Duration,

@@ -1,5 +1,5 @@
-//! Why the transport could not do something, in this crate's words: its own errors are of
-//! iceoryx2's types and differ from call to call.
+//! [`TransportFault`]: why iceoryx2 could not do something, in one enum. iceoryx2's own errors have
+//! another type for each call.
 
 use std::io;
 
@@ -30,26 +30,26 @@ pub enum TransportFault {
     /// The process that was creating it has not finished.
     #[error("the process that was creating it has not finished")]
     Unfinished,
-    /// What lies in shared memory or in the bus's folder contradicts itself.
+    /// The contents of shared memory or of the bus's folder contradict each other.
     #[error("its shared files contradict each other")]
     Corrupted,
-    /// A signal came in between.
+    /// A signal interrupted the call.
     #[error("a signal interrupted it")]
     Interrupted,
-    /// The user has no right to it.
+    /// The user has no permission to use it.
     #[error("the permission is missing")]
     Permission,
     /// There is no memory for samples.
-    #[error("no shared memory could be had for its samples")]
+    #[error("there is no shared memory for its samples")]
     NoMemory,
     /// A file in the bus's folder could not be written.
     #[error("its file in the bus's folder could not be written")]
     NoFile,
-    /// The other end's shared memory could not be opened.
+    /// The shared memory of the other process could not be opened.
     #[error("the shared memory of the other end could not be opened")]
     NoConnection,
     /// A limit of the service was exceeded.
-    #[error("a limit of it is exceeded")]
+    #[error("one of its limits is exceeded")]
     Limit,
     /// The name is too long for a service.
     #[error("its name is too long")]
@@ -57,8 +57,8 @@ pub enum TransportFault {
     /// The operating system refused a call.
     #[error("the system refused a call: {0}")]
     System(io::ErrorKind),
-    /// The transport says no more than that it failed.
-    #[error("the transport failed inside")]
+    /// The transport gives no other reason.
+    #[error("the transport failed for another reason")]
     Internal,
 }
 
@@ -72,24 +72,24 @@ impl From<io::Error> for TransportFault {
 pub(crate) enum Refusal {
     /// Trying again may help.
     Passing(TransportFault),
-    /// A running process uses it differently.
+    /// A running process uses the service with another layout or other limits.
     Differs(Difference),
-    /// The user may not.
+    /// The user has no permission to use it.
     Permission,
-    /// It is of another version of the transport.
+    /// A process with another version of the transport has made it.
     Version,
-    /// Too many processes have it open.
+    /// Too many processes have the service open.
     Crowded,
 }
 
-/// In what a service in use differs from the one that this process would make.
+/// How a service in use differs from the one that this process would make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Difference {
     /// The payload's or the header's name, size or alignment.
     #[error("another type")]
     Type,
-    /// The hash of the layout, which every lager process states.
+    /// The hash of the layout, which every process of this project states.
     #[error("another schema")]
     Schema,
     /// Buffers, places or other limits.
@@ -101,12 +101,12 @@ pub enum Difference {
     /// The board of bells in shared memory.
     #[error("its board in shared memory differs")]
     Board,
-    /// It does not say how its samples are laid out.
+    /// The service has no description of its samples.
     #[error("it does not describe its samples")]
     Undescribed,
 }
 
-/// The meanings that the three kinds of service share.
+/// The conversions of errors that all three kinds of service have.
 macro_rules! refusals {
     ($($error:ident: $($variant:ident)|* => $differs:expr;)*) => {
         $(impl From<$error> for Refusal {
@@ -165,7 +165,7 @@ macro_rules! creations {
 
 creations!(PublishSubscribeCreateError RequestResponseCreateError EventCreateError);
 
-/// The faults of calls that either work or do not.
+/// The conversions of errors of calls that are not tried again.
 macro_rules! faults {
     ($($error:ident { $($($variant:ident)|+ => $fault:ident),* $(,)? })*) => {
         $(impl From<$error> for TransportFault {

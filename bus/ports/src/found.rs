@@ -1,8 +1,8 @@
-//! Topics that this process was not built with: read by the description that travels with them.
+//! Reads topics that are not in this process's table, by the description that each topic carries.
 
 use core::fmt;
 
-use lager_topics::{Described, Description, Stamp};
+use lager_sample::{Described, Description, Stamp};
 
 use crate::bus::Bus;
 use crate::error::{PortError, ReceiveError};
@@ -10,7 +10,7 @@ use crate::kind::Side;
 use crate::service;
 use crate::untyped::{Reader, Taken};
 
-/// The reading end of a topic that is only known by its name; stays in the thread that made it.
+/// The reading end of a topic of which only the name is known; stays in the thread that made it.
 pub struct Found {
     name: String,
     description: Description,
@@ -20,23 +20,23 @@ pub struct Found {
 impl Found {
     /// `None` if no process has the topic open.
     pub(crate) fn new(bus: &Bus, name: &str) -> Result<Option<Self>, PortError> {
-        let found = service::found(bus, bus.robot(), name, Side::Public)?;
+        let found = service::found(bus, bus.unit(), name, Side::Public)?;
         let Some((service, description)) = found else {
             return Ok(None);
         };
         Ok(Some(Self {
             name: name.to_owned(),
             description,
-            reader: Reader::of(bus, name, &service)?,
+            reader: Reader::of_found(bus, name, &service)?,
         }))
     }
 
-    /// The topic's name behind `lager/<robot>/`.
+    /// The topic's name behind `<family>/<unit>/`.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// How its samples are laid out, as its creator says.
+    /// The layout of the topic's samples, as the topic's creator states it.
     pub fn description(&self) -> &Description {
         &self.description
     }
@@ -49,7 +49,7 @@ impl Found {
         Ok(self.receive_counted()?.map(|(sample, _)| sample))
     }
 
-    /// The next sample, and how many were missed up to it.
+    /// The next sample, and how many samples were missed before it.
     pub(crate) fn receive_counted(
         &mut self,
     ) -> Result<Option<(FoundSample<'_>, u64)>, ReceiveError> {
@@ -90,20 +90,20 @@ pub struct FoundSample<'found> {
 }
 
 impl FoundSample<'_> {
-    /// The stamp: when, why and by whom it was published, and its number.
+    /// The stamp: when, why and by which process the sample was published, and its number.
     pub fn stamp(&self) -> &Stamp {
         self.taken.stamp()
     }
 
-    /// The payload, to be written by serde.
+    /// The payload, which serde can serialize.
     #[allow(
         unsafe_code,
         reason = "the sample knows where its payload is, not what"
     )]
     pub fn payload(&self) -> Described<'_> {
         let size = self.description.size();
-        // SAFETY: `service::found` has made sure that a payload has as many bytes. The sample is
-        // held, and its writer does not touch it meanwhile.
+        // SAFETY: `service::found` has checked that a payload has `size` bytes. The reader holds
+        // the sample, and the writer does not change it meanwhile.
         let bytes = unsafe { core::slice::from_raw_parts(self.taken.payload().as_ptr(), size) };
         let read = self.description.read(bytes);
         read.expect("as many bytes as the description says")

@@ -1,4 +1,4 @@
-//! Values of the transport that end in this crate, so that no other crate compiles their drop code.
+//! Wraps values of iceoryx2, so that this crate compiles their drop code and no other crate does.
 
 #![allow(
     unsafe_code,
@@ -15,13 +15,13 @@ use crate::transport::Ipc;
 /// A value of the transport whose drop code is compiled in this crate, wherever it is dropped.
 pub(crate) struct Here<T: Ends>(ManuallyDrop<T>);
 
-/// How a [`Here`] ends. Implemented for each type by [`ends_here!`], since a function for any type
-/// would be compiled where it is used.
+/// How a [`Here`] drops its value. [`ends_here!`] implements it for each type, because a generic
+/// function would be compiled in the crate that uses it.
 pub(crate) trait Ends: Sized {
-    /// Drops it.
+    /// Drops the value.
     ///
     /// # Safety
-    /// It is not used after this.
+    /// The caller does not use the value after this.
     unsafe fn end(this: &mut ManuallyDrop<Self>);
 }
 
@@ -30,7 +30,7 @@ macro_rules! ends_here {
         impl $crate::here::Ends for $type {
             #[inline(never)]
             unsafe fn end(this: &mut core::mem::ManuallyDrop<Self>) {
-                // SAFETY: the caller promises that it is not used after this.
+                // SAFETY: the caller promises not to use the value after this.
                 unsafe { core::mem::ManuallyDrop::drop(this) }
             }
         }
@@ -45,7 +45,7 @@ impl<T: Ends> Here<T> {
         Self(ManuallyDrop::new(value))
     }
 
-    /// What it holds, which then ends where the caller lets it.
+    /// Returns the value. It is then dropped where the caller drops it.
     pub(crate) fn take(self) -> T {
         let mut this = ManuallyDrop::new(self);
         // SAFETY: `this` is neither used nor dropped after this.
@@ -55,7 +55,7 @@ impl<T: Ends> Here<T> {
 
 impl<T: Ends> Drop for Here<T> {
     fn drop(&mut self) {
-        // SAFETY: what is being dropped is not used any more.
+        // SAFETY: this wrapper is being dropped, so nobody uses the value any more.
         unsafe { T::end(&mut self.0) }
     }
 }

@@ -1,4 +1,4 @@
-//! Who is on the bus and what is in use there. Only looks; nothing here creates a topic.
+//! Lists the processes and the topics on the bus, for tools. It creates no topic.
 
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeView;
@@ -6,17 +6,15 @@ use iceoryx2::prelude::{
     CallbackProgression, Node, NodeState as IpcNodeState, PortFactory, Service,
 };
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
-use lager_topics::{Description, Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
+use lager_home::{Descriptions, UnitName};
+use lager_sample::{Application, Description, TopicEntry};
 
 use crate::bus::Bus;
 use crate::config::BusConfig;
-use crate::descriptions::Descriptions;
-use crate::doorbell;
 use crate::error::IntrospectError;
 use crate::fault::TransportFault;
 use crate::kind::{Kind, Side};
-use crate::mend;
-use crate::name::{self, RobotName};
+use crate::name;
 use crate::service::{self, TopicService};
 use crate::sweep;
 use crate::transport::Ipc;
@@ -26,74 +24,80 @@ use crate::transport::Ipc;
 pub enum Layout {
     /// No process uses it.
     Unused,
-    /// As in the table.
+    /// The layout is that of the table.
     Ours,
     /// The name is in the table, but the processes that use it are of another build.
     Other,
     /// The name is not in the table, and the topic describes its samples itself.
     Described,
-    /// The name is not in the table, and nobody says what its samples are.
+    /// The name is not in the table, and the topic has no description of its samples.
     Unknown,
 }
 
-/// One end of a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A process that has a port on a topic.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Peer {
-    /// What the process is; `None` if it is not one of ours.
-    pub role: Option<Role>,
-    /// Its process id; 0 if it is not one of ours.
+    /// The part that its process plays; `None` if it is not a process of the application.
+    pub part: Option<String>,
+    /// The process id; 0 if it is not a process of the application.
     pub pid: u32,
+    /// Whether its process is an observer.
+    pub observes: bool,
 }
 
 impl Peer {
+    /// The part that its process plays, or `a stranger` for any other process.
+    pub fn who(&self) -> &str {
+        self.part.as_deref().unwrap_or("a stranger")
+    }
+
     fn of(port_name: &str) -> Self {
-        match name::parse_port(port_name) {
-            Some((role, pid)) => Self {
-                role: Some(role),
-                pid,
-            },
-            None => Self { role: None, pid: 0 },
+        let named = name::parse_port(port_name);
+        Self {
+            part: named.map(|(part, ..)| part.to_owned()),
+            pid: named.map_or(0, |(_, pid, _)| pid),
+            observes: named.is_some_and(|(.., observes)| observes),
         }
     }
 }
 
-/// A topic of one robot, as it is in use.
+/// A topic that is in use on one unit.
 #[derive(Clone, Debug)]
 pub struct TopicInfo {
-    /// The robot.
-    pub robot: RobotName,
-    /// The name behind `lager/<robot>/`.
+    /// The unit.
+    pub unit: UnitName,
+    /// The name behind `<family>/<unit>/`.
     pub name: String,
-    /// The line of this build's table.
+    /// The topic's line in this build's table; `None` if it has none.
     pub entry: Option<&'static TopicEntry>,
-    /// How the topic in use compares with it. Ends are only known if it is [`Layout::Ours`] or
-    /// [`Layout::Described`].
+    /// How the topic in use compares with the table. Writers and readers are only known if this is
+    /// [`Layout::Ours`] or [`Layout::Described`].
     pub layout: Layout,
-    /// What a topic says of itself that is not in the table.
+    /// The topic's own description of its samples, if the topic is not in the table.
     pub description: Option<Description>,
-    /// Number of writers. A killed one counts until it is swept.
+    /// Number of writers. A killed writer counts until a sweep removes it.
     pub publishers: usize,
-    /// Number of readers. A killed one counts until it is swept.
+    /// Number of readers. A killed reader counts until a sweep removes it.
     pub subscribers: usize,
     /// Number of readers that are observers.
     pub observers: usize,
-    /// How many may read under its public name; known of topics that are not in the table only.
+    /// How many readers the topic's public service admits; known only if the table lacks the topic.
     pub places: Option<usize>,
     /// The writers.
     pub writers: Vec<Peer>,
     /// The readers.
     pub readers: Vec<Peer>,
-    /// The waiters that each sample wakes, once for each; a killed one is not among them. Known of
-    /// topics of the table only.
+    /// The waiters that each sample wakes, one entry for each waiter. A killed waiter is not
+    /// listed. Known for topics of the table only.
     pub woken: Vec<Peer>,
 }
 
 impl TopicInfo {
-    fn without_ends(robot: &RobotName, name: &str, layout: Layout) -> Self {
+    fn without_ends(bus: &Bus, unit: &UnitName, name: &str, layout: Layout) -> Self {
         Self {
-            robot: robot.clone(),
+            unit: unit.clone(),
             name: name.to_owned(),
-            entry: TOPICS.iter().find(|entry| entry.name == name),
+            entry: bus.application().entry(name),
             layout,
             description: None,
             publishers: 0,
@@ -108,9 +112,8 @@ impl TopicInfo {
 }
 
 impl TopicInfo {
-    /// Counts the ends at all services of a topic. A reader
-    /// reads one of them; a writer writes to all, so what one process has there is the most that it
-    /// has at any of them.
+    /// Lists writers and readers at all services of a topic. A reader has a port at one of the
+    /// services. A writer has one at each, so a process has as many as its highest count.
     fn look_at_ends<'a>(&mut self, services: impl IntoIterator<Item = &'a TopicService>) {
         let mut writers: Vec<(u128, Peer)> = Vec::new();
         for service in services {
@@ -134,17 +137,16 @@ impl TopicInfo {
         self.writers = writers.into_iter().map(|(_, peer)| peer).collect();
         self.publishers = self.writers.len();
         self.subscribers = self.readers.len();
-        let observes = |peer: &&Peer| peer.role.is_some_and(Role::is_observer);
-        self.observers = self.readers.iter().filter(observes).count();
+        self.observers = self.readers.iter().filter(|peer| peer.observes).count();
     }
 }
 
-/// Whether a process lives.
+/// Whether the process of a node lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeState {
-    /// It does.
+    /// It lives.
     Alive,
-    /// It was killed, and what it left is not swept yet.
+    /// It was killed, and no sweep has removed its files yet.
     Stale,
     /// Not known: its files belong to another user or are damaged.
     Unknown,
@@ -153,22 +155,22 @@ pub enum NodeState {
 /// A process on the bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeInfo {
-    /// The node's name; `lager/<robot>/<role>/<pid>` for one of ours, empty if unknown.
+    /// The node's name; `<family>/<unit>/<part>/<pid>` for the application; empty if unknown.
     pub name: String,
     /// The executable's file name, empty if unknown.
     pub executable: String,
-    /// The robot, if the process is one of ours.
-    pub robot: Option<RobotName>,
-    /// The role, if the process is one of ours.
-    pub role: Option<Role>,
+    /// The unit, if the process is one of the application.
+    pub unit: Option<UnitName>,
+    /// The part that the process plays, if it is one of the application.
+    pub part: Option<String>,
     /// The process id; 0 if unknown.
     pub pid: u32,
-    /// Whether it lives.
+    /// Whether the process lives.
     pub state: NodeState,
 }
 
 impl Bus {
-    /// Every topic in use on this bus, of every robot.
+    /// Every topic in use on this bus, of every unit.
     ///
     /// # Errors
     /// The bus's files cannot be listed.
@@ -176,12 +178,10 @@ impl Bus {
         topics(self)
     }
 
-    /// Every topic of the table as one robot uses it; those not in use have no ports.
-    pub fn topics_of(&self, robot: &RobotName) -> Vec<TopicInfo> {
-        TOPICS
-            .iter()
-            .map(|entry| look(self, robot, entry.name))
-            .collect()
+    /// Every topic of the table as one unit uses it; a topic that is not in use has no ports.
+    pub fn topics_of(&self, unit: &UnitName) -> Vec<TopicInfo> {
+        let table = self.application().topics.iter();
+        table.map(|entry| look_at(self, unit, entry)).collect()
     }
 
     /// Every process on this bus, living or dead.
@@ -189,7 +189,7 @@ impl Bus {
     /// # Errors
     /// The bus's files cannot be listed.
     pub fn nodes(&self) -> Result<Vec<NodeInfo>, IntrospectError> {
-        list(self.transport())
+        list(self.application(), self.transport())
     }
 }
 
@@ -198,25 +198,24 @@ impl Bus {
 /// # Errors
 /// The configuration is not usable, or the bus's files cannot be listed.
 pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
-    list(&config.transport(&config.place()?)?)
+    list(config.application, &config.transport(&config.home()?)?)
 }
 
-/// Removes what killed processes left behind, without joining the bus; returns how many of them
-/// there were.
+/// Removes what killed processes left behind, without joining the bus; returns their number.
 ///
 /// # Errors
 /// The configuration is not usable, or the bus's files cannot be listed.
 pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> {
-    let place = config.place()?;
-    let config = config.transport(&place)?;
-    mend::unfinished(&place, &mut Descriptions::default());
+    let home = config.home()?;
+    let config = config.transport(&home)?;
+    lager_home::unfinished(&home, &mut Descriptions::default());
     let removed = sweep::dead_nodes(&config).map_err(TransportFault::from)?;
-    doorbell::sweep_all(&place);
-    place.sweep_locks();
+    lager_wake::sweep_all(&home);
+    home.sweep_locks();
     Ok(removed)
 }
 
-fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
+fn list(application: &Application, config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
     let mut found = Vec::new();
     Node::<Ipc>::list(config, |state| {
         let (details, state) = match &state {
@@ -227,12 +226,13 @@ fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
             }
         };
         let name = details.map_or_else(String::new, |details| details.name().to_string());
-        let ours = name::parse_node(&name);
+        let ours =
+            name::parse_node(application, &name).map(|(unit, part, _)| (unit, part.to_owned()));
         found.push(NodeInfo {
             executable: details
                 .map_or_else(String::new, |details| details.executable().to_string()),
-            robot: ours.as_ref().map(|(robot, _, _)| robot.clone()),
-            role: ours.as_ref().map(|(_, role, _)| *role),
+            unit: ours.as_ref().map(|(unit, _)| unit.clone()),
+            part: ours.map(|(_, part)| part),
             // Process ids are positive.
             pid: details.map_or(0, |details| details.process_id().value() as u32),
             name,
@@ -252,10 +252,11 @@ fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
         if matches!(
             details.messaging_pattern(),
             MessagingPattern::PublishSubscribe(_)
-        ) && let Some((robot, service)) = name::parse_service(details.name().as_str())
+        ) && let Some((unit, service)) =
+            name::parse_service(bus.application(), details.name().as_str())
         {
             let topic = name::topic_of(service);
-            in_use.push((robot, place(topic), topic.to_owned()));
+            in_use.push((unit, place(bus, topic), topic.to_owned()));
         }
         CallbackProgression::Continue
     })
@@ -264,68 +265,61 @@ fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
     in_use.dedup();
     Ok(in_use
         .iter()
-        .map(|(robot, _, topic)| look(bus, robot, topic))
+        .map(|(unit, _, topic)| look(bus, unit, topic))
         .collect())
 }
 
-/// Topics are listed in the table's order, others behind them.
-fn place(topic: &str) -> usize {
-    TOPICS
-        .iter()
-        .position(|entry| entry.name == topic)
-        .unwrap_or(TOPICS.len())
+/// The position in the list: topics in the table's order, other topics after them.
+fn place(bus: &Bus, topic: &str) -> usize {
+    let table = bus.application().topics;
+    let place = table.iter().position(|entry| entry.name == topic);
+    place.unwrap_or(table.len())
 }
 
-fn look(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
-    visit(topic, Look { bus, robot }).unwrap_or_else(|_| look_at_other(bus, robot, topic))
+fn look(bus: &Bus, unit: &UnitName, topic: &str) -> TopicInfo {
+    match bus.application().entry(topic) {
+        Some(entry) => look_at(bus, unit, entry),
+        None => look_at_other(bus, unit, topic),
+    }
 }
 
-fn look_at_other(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
-    let Ok(Some((public, description))) = service::found(bus, robot, topic, Side::Public) else {
-        return TopicInfo::without_ends(robot, topic, Layout::Unknown);
+fn look_at_other(bus: &Bus, unit: &UnitName, topic: &str) -> TopicInfo {
+    let Ok(Some((public, description))) = service::found(bus, unit, topic, Side::Public) else {
+        return TopicInfo::without_ends(bus, unit, topic, Layout::Unknown);
     };
-    let actors = service::found(bus, robot, topic, Side::Actors);
+    let actors = service::found(bus, unit, topic, Side::Actors);
     let actors = actors.ok().flatten().map(|(service, _)| service);
-    let mut info = TopicInfo::without_ends(robot, topic, Layout::Described);
+    let mut info = TopicInfo::without_ends(bus, unit, topic, Layout::Described);
     info.description = Some(description);
     info.places = Some(public.static_config().max_subscribers());
     info.look_at_ends([&public].into_iter().chain(&actors));
     info
 }
 
-struct Look<'a> {
-    bus: &'a Bus,
-    robot: &'a RobotName,
-}
-
-impl TopicVisitor for Look<'_> {
-    type Output = TopicInfo;
-
-    fn visit<T: Topic>(self) -> TopicInfo {
-        let without_ends = |layout| TopicInfo::without_ends(self.robot, T::NAME, layout);
-        let sides: &[Side] = match T::QOS.serves_actors_first() {
-            true => &[Side::Public, Side::Actors],
-            false => &[Side::Public],
-        };
-        let open = |side: &Side| {
-            service::existing_topic(self.bus, self.robot, &Kind::of::<T>(), *side).transpose()
-        };
-        let services: Vec<TopicService> = match sides.iter().filter_map(open).collect() {
-            Ok(services) => services,
-            Err(_) => return without_ends(Layout::Other),
-        };
-        if services.is_empty() {
-            return without_ends(Layout::Unused);
-        }
-        let mut info = without_ends(Layout::Ours);
-        info.look_at_ends(&services);
-        for actor in T::QOS.actors {
-            let pids = doorbell::woken(self.bus.place(), self.robot, *actor);
-            info.woken.extend(pids.into_iter().map(|pid| Peer {
-                role: Some(*actor),
-                pid,
-            }));
-        }
-        info
+fn look_at(bus: &Bus, unit: &UnitName, entry: &TopicEntry) -> TopicInfo {
+    let without_ends = |layout| TopicInfo::without_ends(bus, unit, entry.name, layout);
+    let sides: &[Side] = match entry.qos.serves_actors_first() {
+        true => &[Side::Public, Side::Actors],
+        false => &[Side::Public],
+    };
+    let kind = Kind::of_entry(entry);
+    let open = |side: &Side| service::existing_topic(bus, unit, &kind, *side).transpose();
+    let services: Vec<TopicService> = match sides.iter().filter_map(open).collect() {
+        Ok(services) => services,
+        Err(_) => return without_ends(Layout::Other),
+    };
+    if services.is_empty() {
+        return without_ends(Layout::Unused);
     }
+    let mut info = without_ends(Layout::Ours);
+    info.look_at_ends(&services);
+    for actor in entry.qos.actors {
+        let pids = lager_wake::woken(bus.home(), unit, *actor);
+        info.woken.extend(pids.into_iter().map(|pid| Peer {
+            part: Some(actor.name().to_owned()),
+            pid,
+            observes: false,
+        }));
+    }
+    info
 }

@@ -1,23 +1,23 @@
-//! Keeping a service's last value for its successor.
+//! [`Keeper`]: keeps the last value of a service, so that the service can resume after a restart.
 //!
-//! A killed publisher takes its history with it. So the attendant holds a [`Keeper`] for each state
-//! that a service resumes from. The keeper remembers the last value, and when the service has died
-//! it publishes the value with history, so that the successor can read it with
-//! [`crate::Bus::kept`].
+//! The transport removes a killed publisher's history with it. So the supervisor's attendant has a
+//! [`Keeper`] for each state from which a service resumes. The keeper reads every value and
+//! remembers the last one. When the service has died, the keeper publishes that value with history,
+//! and the restarted service (the successor) reads it with [`crate::Bus::kept`].
 //!
 //! ```text
-//! supervisor, every tick:   remember(), which tries again what a hand_over() could not; sweep
+//! supervisor, every tick:   remember(), which repeats a failed hand_over(); then sweep
 //! service died:             remember(); hand_over(); start it again
 //! successor:                kept(); make its own publisher; publish
-//! supervisor, next tick:    remember() sees the successor and withdraws
+//! supervisor, next tick:    remember() reads the successor's value and withdraws its own
 //! ```
 
 use core::fmt;
 
-use lager_topics::{Stamp, Topic};
+use lager_home::Clock;
+use lager_sample::{Stamp, Topic};
 
 use crate::bus::Bus;
-use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError, SendError};
 use crate::publisher::Publisher;
 use crate::streams::Newest;
@@ -29,7 +29,7 @@ pub struct Keeper<T: Topic> {
     subscriber: Subscriber<T>,
     kept: Option<(T::Payload, Stamp)>,
     newest: Newest,
-    /// The kept value is to be handed over and is not yet.
+    /// The keeper must hand the kept value over and has not yet done so.
     due: bool,
     stand_in: Option<Publisher<T>>,
 }
@@ -46,12 +46,12 @@ impl<T: Topic> Keeper<T> {
         })
     }
 
-    /// Drains the topic, keeps what was published last, and withdraws a handed-over value once
-    /// the successor speaks. A hand-over that failed is tried again. Call it on a tick, and before
-    /// every sweep.
+    /// Reads all samples of the topic, keeps the value published last, and withdraws a handed-over
+    /// value once the successor has published. Repeats a hand-over that failed. Call it at every
+    /// tick, and before every sweep.
     ///
     /// # Errors
-    /// The transport failed; what was kept stays kept, and the next call tries again.
+    /// The transport failed. The kept value stays, and the next call tries again.
     pub fn remember(&mut self) -> Result<(), KeeperError> {
         let drained = self.drain();
         if self.due {
@@ -63,11 +63,11 @@ impl<T: Topic> Keeper<T> {
         Ok(drained?)
     }
 
-    /// Publishes the kept value with its original times, so that the successor finds it at its
-    /// start. It does nothing without a kept value. Further calls only serve late joiners.
+    /// Publishes the kept value with its original times, so that the successor finds it when it
+    /// starts. Without a kept value it does nothing. Further calls only serve new readers.
     ///
     /// # Errors
-    /// No publisher could be made, or it could not send; [`Keeper::remember`] tries again.
+    /// The publisher could not be made or could not send; [`Keeper::remember`] tries again.
     pub fn hand_over(&mut self) -> Result<(), KeeperError> {
         if let Some(stand_in) = &self.stand_in {
             stand_in.tick();
@@ -82,7 +82,7 @@ impl<T: Topic> Keeper<T> {
             let stamp = *sample.stamp();
             let now_ns = Clock::monotonic_ns();
             if !self.is_own(&stamp) && self.newest.takes(stamp.publish_time_ns, now_ns) {
-                // The last sample of the dead writer, found late, is the value to hand over.
+                // If the dead writer's last sample is found only now, it is the value to hand over.
                 let is_late = self.kept.as_ref().is_some_and(|(_, kept)| {
                     (kept.writer, kept.epoch) == (stamp.writer, stamp.epoch)
                 });
@@ -105,12 +105,12 @@ impl<T: Topic> Keeper<T> {
         Ok(())
     }
 
-    /// The kept value and when it was published.
+    /// The kept value and its stamp.
     pub fn value(&self) -> Option<(&T::Payload, &Stamp)> {
         self.kept.as_ref().map(|(payload, stamp)| (payload, stamp))
     }
 
-    /// Whether a value is handed over and no successor has taken the topic up yet.
+    /// Whether this keeper has handed a value over and no successor has published yet.
     pub fn is_standing_in(&self) -> bool {
         self.stand_in.is_some()
     }
@@ -144,7 +144,7 @@ pub enum KeeperError {
     /// No publisher could be made.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// It could not send.
+    /// The publisher could not send.
     #[error(transparent)]
     Send(#[from] SendError),
 }

@@ -1,12 +1,12 @@
-//! What a successor finds of its predecessor, and the difference between "nobody kept anything" and
-//! "it cannot be read".
+//! Reads the value that a predecessor left for this process, and tells "no keeper has a value" from
+//! "the topic cannot be read".
 //!
-//! Apart from the [`Keeper`](crate::Keeper), which lives in another process: this is the other end.
+//! It is apart from the [`Keeper`](crate::Keeper), which lives in another process.
 
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_topics::{Stamp, Topic};
+use lager_sample::{Stamp, Topic};
 
 use crate::bus::Bus;
 use crate::error::{PortError, ReceiveError};
@@ -19,20 +19,20 @@ pub enum KeptError {
     /// The topic could not be opened.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// It could not be read.
+    /// The topic could not be read.
     #[error(
-        "what an earlier process left on `{topic}` cannot be read ({fault}), so where it was is not known; check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
+        "what an earlier process left on `{topic}` cannot be read ({fault}), so its last state is not known; check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
     )]
     Unreadable {
         /// The topic.
         topic: &'static str,
-        /// What was met last.
+        /// The fault of the last attempt.
         fault: TransportFault,
     },
 }
 
 impl From<KeptError> for PortError {
-    /// For a process that cannot begin without that value.
+    /// For a process that cannot start without the kept value.
     fn from(error: KeptError) -> Self {
         match error {
             KeptError::Port(error) => error,
@@ -44,14 +44,14 @@ impl From<KeptError> for PortError {
     }
 }
 
-/// How often a topic that cannot be read is opened again before the fault counts as lasting. The
-/// first sweep removes a killed writer.
+/// How often a topic that cannot be read is opened before the error is returned. The sweep after
+/// the first attempt removes a killed writer.
 const ATTEMPTS: u32 = 5;
 
 /// Pause between attempts, in real time.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// Waits for a value of a topic this process is about to write.
+/// Waits for a value of a topic that this process is about to write.
 pub(crate) fn kept<T: Topic>(
     bus: &Bus,
     timeout: Duration,

@@ -1,20 +1,22 @@
-//! Topics and requests without their types: what the transport has to know of them.
+//! [`Kind`] and [`Question`]: a topic and a request as the transport sees them, without Rust types.
 //!
-//! Apart from the untyped ports, because whoever opens a service needs it as well.
+//! It is apart from the untyped ports because the code that opens services needs it too.
 
 use iceoryx2::service::marker::{CustomHeaderMarker, CustomPayloadMarker};
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use iceoryx2_bb_elementary_traits::type_name::TypeName;
-use lager_topics::{Field, LARGEST_COPY, Make, Qos, Request, Role, Schema, Stamp, Topic};
+use lager_sample::{
+    LARGEST_COPY, Make, Part, Qos, Request, Schema, Stamp, StructInfo, Topic, TopicEntry,
+};
 
 use crate::name;
 
-/// One of a topic's services.
+/// One of the services of iceoryx2 that a topic has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// The one under the topic's name.
+    /// The service under the topic's name.
     Public,
-    /// The one that the actors read, of a topic that serves them first.
+    /// The service that the actors read, if the topic serves them first.
     Actors,
 }
 
@@ -27,7 +29,7 @@ impl Side {
         }
     }
 
-    /// Places for subscribers.
+    /// How many subscribers the service admits.
     pub(crate) const fn places(self, qos: &Qos) -> usize {
         match self {
             Self::Public => qos.max_subscribers(),
@@ -36,10 +38,10 @@ impl Side {
     }
 }
 
-/// What a payload is to the transport.
+/// The type that the transport sees as every payload.
 pub(crate) type Bytes = [CustomPayloadMarker];
 
-/// What a header of ours is to the transport.
+/// The type that the transport sees as every header.
 pub(crate) type Header = CustomHeaderMarker;
 
 /// A topic without its type.
@@ -48,11 +50,7 @@ pub(crate) struct Kind {
     pub(crate) name: &'static str,
     pub(crate) id: u32,
     pub(crate) qos: Qos,
-    pub(crate) payload: fn() -> TypeDetail,
-    /// What the payload is made of.
-    pub(crate) make: Make,
-    /// The hashes of payload and header.
-    pub(crate) layout: [u64; 2],
+    pub(crate) payload: StructInfo,
 }
 
 impl Kind {
@@ -71,22 +69,52 @@ impl Kind {
             name: T::NAME,
             id: T::ID,
             qos: T::QOS,
-            payload: detail::<T::Payload>,
-            make: T::Payload::MAKE,
-            layout: [T::Payload::HASH, Stamp::HASH],
+            payload: StructInfo::of::<T::Payload>(),
         }
     }
 
-    /// The service from which a process of that role reads.
-    pub(crate) fn side(&self, role: Role) -> Side {
-        if self.qos.serves_actors_first() && self.qos.actors.contains(&role) {
+    /// The kind of a topic in the application's table.
+    pub(crate) fn of_entry(entry: &TopicEntry) -> Self {
+        Self {
+            name: entry.name,
+            id: entry.id,
+            qos: entry.qos,
+            payload: entry.layout,
+        }
+    }
+
+    /// The payload as the transport compares it between processes.
+    pub(crate) fn detail(&self) -> TypeDetail {
+        let StructInfo {
+            type_name,
+            size,
+            align,
+            ..
+        } = self.payload;
+        TypeDetail::__internal_new_from_parts(TypeVariant::FixedSize, type_name, size, align)
+            .expect("a payload's name fits, as `Kind::of` has found out")
+    }
+
+    /// The list of the payload's fields.
+    pub(crate) const fn make(&self) -> Make {
+        Make::Record(self.payload)
+    }
+
+    /// The hashes of payload and header.
+    pub(crate) const fn layout(&self) -> [u64; 2] {
+        [self.payload.hash, Stamp::HASH]
+    }
+
+    /// The service that a process of this part reads.
+    pub(crate) fn side(&self, part: Part) -> Side {
+        if self.qos.serves_actors_first() && self.qos.actors.contains(&part) {
             Side::Actors
         } else {
             Side::Public
         }
     }
 
-    /// The header of every topic.
+    /// The header that every sample has: its stamp.
     pub(crate) fn header() -> TypeDetail {
         detail::<Stamp>()
     }
@@ -97,7 +125,7 @@ impl Kind {
 pub(crate) struct Question {
     pub(crate) name: &'static str,
     pub(crate) id: u32,
-    pub(crate) actor: Role,
+    pub(crate) actor: Part,
     pub(crate) request: fn() -> TypeDetail,
     pub(crate) reply: fn() -> TypeDetail,
     /// The hashes of request and reply.

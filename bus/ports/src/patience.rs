@@ -1,4 +1,4 @@
-//! How long opening waits for processes that come, go or die meanwhile.
+//! Tries to open or create something again while other processes start, end or die.
 
 use core::time::Duration;
 use std::time::Instant;
@@ -6,23 +6,23 @@ use std::time::Instant;
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::fault::TransportFault;
-use crate::shortage::Shortage;
+use lager_home::Shortage;
 
 /// How an attempt to open or create something failed.
 pub(crate) enum Fault {
-    /// Another process is in the middle of something, or has died there: sweep and try again.
+    /// Another process is creating or removing it, or died while it did: sweep and try again.
     Passing(TransportFault),
-    /// A limit is met: sweep in case dead processes hold the places, then give up.
+    /// All places are taken: sweep in case dead processes hold some, try again, then give up.
     Full(PortError),
-    /// Trying again cannot help.
+    /// Another attempt cannot help.
     Lasting(PortError),
 }
 
-/// How long passing faults are retried, in real time; longer than any creation takes.
+/// How long such attempts are repeated, in real time; longer than any creation takes.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Tries until it works, a fault lasts, or patience ends. Sweeps between attempts, which removes
-/// what nobody is finishing any more.
+/// Tries until it works, an error is lasting, or `PATIENCE` is over. Sweeps between attempts, which
+/// removes what a dead process left unfinished.
 pub(crate) fn patiently<T>(
     bus: &Bus,
     topic: &str,

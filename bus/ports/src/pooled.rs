@@ -1,4 +1,4 @@
-//! A reference-counted box whose memory is used again: an `Rc` that spares the heap.
+//! [`Pooled`]: a reference-counted box like `Rc`, whose memory is reused instead of freed.
 //!
 //! iceoryx2 makes one small shared value for each loan and drops it when the sample is sent. With
 //! an `Rc` that is one allocation per frame; here the memory comes from a list of spare blocks
@@ -19,9 +19,9 @@
 //! **Invariants**, on which the unsafe code rests:
 //! 1. `place` points to an initialised [`Counted`] for as long as it has holders, and `holders`
 //!    is the number of [`Pooled`] that point to it.
-//! 2. It was a box: of a [`Block`] if [`Counted::FITS`], otherwise of a `Counted` itself. Both
-//!    sides ask `FITS`, which depends on the type alone. A block belongs to no thread; one that is
-//!    given back elsewhere, or when its thread has no list any more, is in order.
+//! 2. The memory was made as a box: of a [`Block`] if [`Counted::FITS`], otherwise of a `Counted`.
+//!    Allocation and release both ask `FITS`, which depends on the type alone. A block belongs to
+//!    no thread: another thread may give it back, and so may a thread whose list is already gone.
 //! 3. Nobody has a `&mut` to the value before the last holder goes.
 //! 4. A `Pooled` is neither `Send` nor `Sync`, since `holders` is a plain number.
 
@@ -39,7 +39,7 @@ use core::ptr::NonNull;
 use iceoryx2_bb_elementary_traits::testing::abandonable::Abandonable;
 use iceoryx2_cal::arc_sync_policy::{ArcSyncPolicy, ArcSyncPolicyCreationError, LockGuard};
 
-/// Spare blocks a thread keeps: 2 KiB. A loan needs one until it is sent.
+/// Spare blocks that a thread keeps: 2 KiB together. A loan needs one until it is sent.
 const SPARES: usize = 32;
 
 /// What all spare blocks look like. iceoryx2's value for a loan needs 40 bytes, count included.
@@ -51,7 +51,7 @@ struct Block {
 type Spare = Box<MaybeUninit<Block>>;
 
 thread_local! {
-    /// Never grows: its capacity is its limit.
+    /// Never grows: it takes no more blocks than its first capacity.
     static LIST: RefCell<Vec<Spare>> =
         RefCell::new((0..SPARES).map(|_| Box::new_uninit()).collect());
 }
@@ -64,7 +64,7 @@ fn take() -> Spare {
         .unwrap_or_else(Box::new_uninit)
 }
 
-/// Keeps the block if there is room for it; otherwise it goes to the heap.
+/// Keeps the block if the list has room for it; otherwise frees it.
 fn give_back(block: Spare) {
     let _ = LIST.try_with(|list| {
         let mut list = list.borrow_mut();
@@ -74,22 +74,22 @@ fn give_back(block: Spare) {
     });
 }
 
-/// What holders share.
+/// The memory that all holders share.
 struct Counted<T> {
     holders: Cell<usize>,
     value: T,
 }
 
 impl<T> Counted<T> {
-    /// Whether it lives in a block.
+    /// Whether the value and its count fit into a block.
     const FITS: bool =
         size_of::<Self>() <= size_of::<Block>() && align_of::<Self>() <= align_of::<Block>();
 
-    /// Moves it to where it stays until [`Counted::release`].
+    /// Moves the value into memory where it stays until [`Counted::release`].
     fn place(self) -> NonNull<Self> {
         if Self::FITS {
             let place = NonNull::from(Box::leak(take())).cast::<Self>();
-            // SAFETY: the block is ours alone, and by `FITS` large enough and aligned.
+            // SAFETY: nobody else has the block, and by `FITS` it is large enough and aligned.
             unsafe { place.write(self) };
             place
         } else {
@@ -97,18 +97,18 @@ impl<T> Counted<T> {
         }
     }
 
-    /// Gives the memory back without dropping what is in it.
+    /// Gives the memory back without dropping the value in it.
     ///
     /// # Safety
-    /// `place` is from [`Counted::place`], and nobody uses it any more.
+    /// `place` comes from [`Counted::place`], and nobody uses it any more.
     unsafe fn release(place: NonNull<Self>) {
         if Self::FITS {
-            // SAFETY: by invariant 2 this was a box of a block, whose content is of no matter.
+            // SAFETY: by invariant 2 this was a box of a block, and a block may have any content.
             give_back(unsafe { Box::from_raw(place.cast().as_ptr()) });
         } else {
             let memory = place.cast::<MaybeUninit<Self>>();
-            // SAFETY: by invariant 2 this was a box of the same layout; its content is of no
-            // matter to a `MaybeUninit`.
+            // SAFETY: by invariant 2 this was a box of the same layout, and a `MaybeUninit` may
+            // have any content.
             drop(unsafe { Box::from_raw(memory.as_ptr()) });
         }
     }
@@ -128,7 +128,7 @@ impl<T> Pooled<T> {
     }
 
     fn counted(&self) -> &Counted<T> {
-        // SAFETY: by invariant 1 it is there while `self` is, and by 3 it is only read.
+        // SAFETY: by invariant 1 the value exists while `self` does, and by 3 it is only read.
         unsafe { self.place.as_ref() }
     }
 }
@@ -138,7 +138,7 @@ impl<T> Clone for Pooled<T> {
         let holders = &self.counted().holders;
         match holders.get().checked_add(1) {
             Some(more) => holders.set(more),
-            // Only clones that are forgotten get here; a count that wraps would free too early.
+            // Only forgotten clones lead here; a count that wraps to 0 would free too early.
             None => std::process::abort(),
         }
         Self { place: self.place }
@@ -153,7 +153,7 @@ impl<T> Drop for Pooled<T> {
             return;
         }
         // SAFETY: this was the last holder, so nobody else has the value or the memory. If the
-        // value's own drop panics, the memory is not given back, which is a leak and no more.
+        // value's own drop panics, the memory is not given back: a leak, but no other harm.
         unsafe {
             self.place.drop_in_place();
             Counted::release(self.place);
@@ -170,8 +170,8 @@ impl<T: fmt::Debug> fmt::Debug for Pooled<T> {
     }
 }
 
-/// iceoryx2's tests simulate dead processes with this: the last holder lets the value leave behind
-/// what a killed process would; any other holder just goes.
+/// iceoryx2's tests simulate dead processes with this: the last holder makes the value leave behind
+/// what a killed process would. Any other holder only decreases the count.
 impl<T: Abandonable> Abandonable for Pooled<T> {
     unsafe fn abandon_in_place(this: NonNull<Self>) {
         // SAFETY: the caller promises a valid `Pooled` that is its own.

@@ -1,28 +1,27 @@
-//! The writing end of a topic.
+//! [`Publisher`]: sends the samples of a topic.
 //!
-//! A sample goes to the topic's actors first, then they are rung, and then everybody else gets a
-//! copy with the same stamp on the service under the topic's name
-//! ([`Qos::copied`](lager_topics::Qos)). So neither the queues of 64 observers nor what they have
-//! returned stands between a sample and who acts on it.
+//! A sample first goes to the topic's actors. Then the publisher rings them. Then everybody else
+//! gets a copy with the same stamp from the service under the topic's name
+//! ([`Qos::copied`](lager_sample::Qos)). So the actors do not wait while the writer fills the
+//! queues of 64 observers and takes back the samples that they have returned.
 //!
-//! What a publish costs: for each sample iceoryx2 visits every place for a subscriber of the
-//! service three times, whether it is taken or not. With one service of 74 places that was most of
-//! the 4 939 instructions of `publish/to-1`; with the 10 places of the actors' service it took
-//! 2 957, 2 363 since the places of observers are counted only when one has come or gone
-//! (`untyped/anyone`), and 2 272 since the compiler keeps iceoryx2's loop in registers
-//! (`untyped/outlet`). With 63 observers beside the actor it takes 35 489; what they cost comes
-//! after the ring. The cost is instructions, not cache misses: boxing what stands in the places, so
-//! that the places lie side by side, was measured and changes nothing (1.65 and 1.67 us a hop).
+//! What a publish costs: for each sample, iceoryx2 visits every place for a subscriber of the
+//! service three times, whether the place is taken or not. With one service of 74 places that was
+//! most of the 4 939 instructions of `publish/to-1`. With the 10 places of the actors' service it
+//! was 2 957; with observers counted only when one has come or gone (`untyped/anyone`), 2 363; with
+//! iceoryx2's loop kept in registers (`untyped/outlet`), 2 272. With 63 observers too it is 35 489,
+//! but their part comes after the ring. The cost is instructions, not cache misses: boxing the
+//! places' contents, so that these lie side by side, changed nothing (1.65 and 1.67 us a hop).
 
 use core::fmt;
 use core::marker::PhantomData;
 use core::ops::{Deref, DerefMut};
 
-use lager_topics::{Stamp, Topic};
+use lager_home::Clock;
+use lager_sample::{Stamp, Topic};
 
 use crate::bus::Bus;
 use crate::cause::Cause;
-use crate::clock::Clock;
 use crate::error::{PortError, SendError};
 use crate::kind::Kind;
 use crate::untyped::{Lent, To, Writer};
@@ -43,7 +42,7 @@ impl<T: Topic> Publisher<T> {
         })
     }
 
-    /// Takes a sample to be filled in place; it starts as the payload's blank value.
+    /// Takes a sample that the caller fills in place. It starts as the payload's blank value.
     ///
     /// # Errors
     /// Too many samples are on loan, or the transport failed.
@@ -51,8 +50,8 @@ impl<T: Topic> Publisher<T> {
         self.filled(T::Payload::default())
     }
 
-    /// Takes a sample whose payload is whatever lay there: zeros, or an earlier sample. For large
-    /// payloads that are filled anyway, which this saves from being blanked first.
+    /// Takes a sample with whatever payload lay there: zeros, or an earlier sample. For large
+    /// payloads that the caller fills completely, so that they need not be made blank first.
     ///
     /// # Errors
     /// As [`Publisher::loan`].
@@ -60,7 +59,7 @@ impl<T: Topic> Publisher<T> {
         Ok(self.lent(self.writer.lend()?))
     }
 
-    /// Sends a copy of `payload`, which follows from `cause`.
+    /// Sends a copy of `payload` with the cause `cause`.
     ///
     /// # Errors
     /// As [`Publisher::loan`] and [`Loan::send`].
@@ -70,23 +69,22 @@ impl<T: Topic> Publisher<T> {
         loan.send()
     }
 
-    /// Hands the last sample to observers, if it was sent with [`Loan::send_ahead`] and that has
-    /// not been done yet.
+    /// Sends the last sample to observers, if [`Loan::send_ahead`] has kept it back from them.
     ///
     /// # Errors
-    /// The transport failed; observers count the sample as lost.
+    /// The transport failed. Observers count the sample as lost.
     pub fn catch_up(&self) -> Result<(), SendError> {
         self.writer.catch_up()
     }
 
-    /// Gives readers that have come since the last sample their history. A thread that waits in a
-    /// [`crate::Waiter`] need not call it; another writer of a state calls it regularly. It costs
-    /// next to nothing when there are no new readers.
+    /// Sends their history to readers that have come since the last sample. A thread that waits in
+    /// a [`lager_wake::Waiter`] need not call this; any other writer of a state must call it
+    /// regularly. It costs next to nothing when there are no new readers.
     pub fn tick(&self) {
         self.writer.tick();
     }
 
-    /// Start of this publisher's life; with the process it names its stream.
+    /// When this publisher was made; with the process id it identifies the publisher's stream.
     pub fn epoch(&self) -> u64 {
         self.writer.epoch()
     }
@@ -96,8 +94,8 @@ impl<T: Topic> Publisher<T> {
         self.writer.sent()
     }
 
-    /// Sends a recorded sample with the stamp that it had: times, writer, epoch and number. For
-    /// players of recordings; readers take it for that writer's, as old as it is.
+    /// Sends a recorded sample with its recorded stamp: times, writer, epoch and number. For
+    /// players of recordings: readers see the original writer's sample, as old as it is.
     ///
     /// # Errors
     /// As [`Publisher::loan`] and [`Loan::send`].
@@ -106,7 +104,7 @@ impl<T: Topic> Publisher<T> {
         self.writer.deliver_stamped(loan.lent, stamp, To::All)
     }
 
-    /// Sends with the times of an earlier sample of another writer.
+    /// Sends a sample of another writer again, with its original times.
     pub(crate) fn resend(&self, payload: T::Payload, original: &Stamp) -> Result<(), SendError> {
         let mut loan = self.filled(payload)?;
         loan.cause(Cause::of(original));
@@ -117,8 +115,8 @@ impl<T: Topic> Publisher<T> {
     #[allow(unsafe_code, reason = "the loan knows where its payload is, not what")]
     fn filled(&self, payload: T::Payload) -> Result<Loan<'_, T>, SendError> {
         let lent = self.writer.lend()?;
-        // SAFETY: the writer was made with `Kind::of::<T>()`, so there is room for a payload, which
-        // is the loan's alone.
+        // SAFETY: the writer was made with `Kind::of::<T>()`, so there is room for a payload, and
+        // only this loan uses that room.
         unsafe { lent.payload().cast::<T::Payload>().write(payload) };
         Ok(self.lent(lent))
     }
@@ -143,7 +141,7 @@ impl<T: Topic> fmt::Debug for Publisher<T> {
     }
 }
 
-/// A sample that is being written; dropped unsent it leaves no trace.
+/// A sample that the caller is writing. If it is dropped unsent, nobody notices.
 #[must_use = "a loan that is not sent reaches nobody"]
 pub struct Loan<'publisher, T: Topic> {
     lent: Lent,
@@ -160,16 +158,15 @@ impl<T: Topic> Loan<'_, T> {
     /// Sends the sample to the topic's actors and rings them, then sends it to everybody else.
     ///
     /// # Errors
-    /// The transport failed; the sample's number is used up, so those who did not get it count it
-    /// as lost.
+    /// The transport failed. The sample's number is used up, so readers count it as lost.
     pub fn send(self) -> Result<(), SendError> {
         self.deliver(Clock::monotonic_ns(), To::All)
     }
 
     /// Sends the sample to the topic's actors and rings them. Observers get it with
     /// [`Publisher::catch_up`], with the publisher's next sample, or when the publisher is dropped.
-    /// For a thread that has something more urgent to do first; if it is killed before it catches
-    /// up, observers miss this sample.
+    /// For a thread that must do something more urgent first. If it is killed before it catches up,
+    /// observers miss this sample.
     ///
     /// # Errors
     /// As [`Loan::send`].
@@ -177,9 +174,8 @@ impl<T: Topic> Loan<'_, T> {
         self.deliver(Clock::monotonic_ns(), To::Actors)
     }
 
-    /// Sends the sample without ringing: actors find it when another ring or their time-out wakes
-    /// them. For samples that no actor has to act upon at once, so that no process is woken in
-    /// vain.
+    /// Sends the sample without ringing. Actors find it when another ring or their time-out wakes
+    /// them. For samples that no actor must act upon at once, so that no process wakes in vain.
     ///
     /// # Errors
     /// As [`Loan::send`].
@@ -198,8 +194,8 @@ impl<T: Topic> Deref for Loan<'_, T> {
 
     #[allow(unsafe_code, reason = "the loan knows where its payload is, not what")]
     fn deref(&self) -> &T::Payload {
-        // SAFETY: the memory was shared before and so is initialised, any bits are a payload
-        // (`Field`), and the loan is ours until it is sent.
+        // SAFETY: the memory was shared before, so it is initialised; any bits are a valid payload
+        // (`Field`); and nobody else uses the loan until it is sent.
         unsafe { self.lent.payload().cast().as_ref() }
     }
 }

@@ -1,24 +1,24 @@
-//! Requests and replies, for what must be confirmed, such as a change of mode.
+//! [`Client`] and [`Server`]: a request and its reply, for orders that the receiver must confirm,
+//! such as a change of mode.
 //!
-//! Both sides may be killed and restarted at any time. If an answering process appears while the
-//! asker waits, the question is sent to it again. When the asker gives up, the question is
-//! forgotten.
+//! Either process may be killed and restarted at any time. If an answering process appears while
+//! the asker waits, the asker sends its request again. A request whose asker gives up is dropped.
 
 use core::fmt;
 use core::marker::PhantomData;
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_topics::{Payload, Request};
+use lager_home::Clock;
+use lager_sample::{Payload, Request};
 
 use crate::bus::Bus;
-use crate::clock::Clock;
 use crate::error::{CallError, PortError, ReceiveError};
 use crate::kind::Question;
 use crate::untyped::{Answerer, Asker};
 
 type Ask<R> = <R as Request>::Request;
-type Answer<R> = <R as Request>::Reply;
+type Reply<R> = <R as Request>::Reply;
 
 /// The asking side of a request; stays in the thread that made it.
 pub struct Client<R: Request> {
@@ -34,19 +34,19 @@ impl<R: Request> Client<R> {
         })
     }
 
-    /// Asks and waits for the answer, at most `timeout` of real time. The question carries that
-    /// deadline: an actor that finds it later must not act on it any more.
+    /// Asks and waits for the answer, at most `timeout` of real time. The request carries that
+    /// deadline: an actor that finds the request later must not act on it any more.
     ///
-    /// If the answering process dies, its successor is asked again, if it appears in time. So a
-    /// request must be harmless when it is carried out twice.
+    /// If the answering process dies and a successor appears in time, this asks the successor. So a
+    /// request that is carried out twice must do no harm.
     ///
     /// # Errors
     /// No process answers such requests, or none answers in time.
-    pub fn call(&self, mut request: Ask<R>, timeout: Duration) -> Result<Answer<R>, CallError> {
+    pub fn call(&self, mut request: Ask<R>, timeout: Duration) -> Result<Reply<R>, CallError> {
         let start = Instant::now();
         let lifetime_ms = u32::try_from(timeout.as_millis()).unwrap_or(u32::MAX);
         R::date(&mut request, Clock::monotonic_ns(), lifetime_ms);
-        let mut reply = Answer::<R>::default();
+        let mut reply = Reply::<R>::default();
         self.asker
             .call(bytes(&request), bytes_mut(&mut reply), start, timeout)?;
         Ok(reply)
@@ -77,13 +77,13 @@ impl<R: Request> Server<R> {
         })
     }
 
-    /// Answers everything that has been asked; returns how much that was.
+    /// Answers all requests that are waiting; returns their number.
     ///
     /// # Errors
-    /// The transport failed; what was answered before stays answered.
+    /// The transport failed. Requests answered before that stay answered.
     pub fn serve(
         &self,
-        mut answer: impl FnMut(&Ask<R>) -> Answer<R>,
+        mut answer: impl FnMut(&Ask<R>) -> Reply<R>,
     ) -> Result<usize, ReceiveError> {
         let mut answered = 0;
         while let Some(asked) = self.answerer.next()? {
@@ -105,16 +105,16 @@ impl<R: Request> fmt::Debug for Server<R> {
     }
 }
 
-/// A payload as others see it.
+/// A payload as the bytes that other processes see.
 #[allow(unsafe_code, reason = "a payload is its bytes")]
 fn bytes<P: Payload>(payload: &P) -> &[u8] {
-    // SAFETY: a payload has no padding (`lager_topics::payload!`), so all of its bytes have values.
+    // SAFETY: a payload has no padding (`lager_sample::payload!`), so all of its bytes have values.
     unsafe { core::slice::from_raw_parts(core::ptr::from_ref(payload).cast(), size_of::<P>()) }
 }
 
-/// A payload to be filled with what others have sent.
+/// A payload to be filled with the bytes that another process has sent.
 #[allow(unsafe_code, reason = "a payload is its bytes")]
 fn bytes_mut<P: Payload>(payload: &mut P) -> &mut [u8] {
-    // SAFETY: a payload has no padding, and any bytes are one (`lager_topics::Field`).
+    // SAFETY: a payload has no padding, and any bytes are a valid one (`lager_sample::Field`).
     unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(payload).cast(), size_of::<P>()) }
 }

@@ -1,15 +1,15 @@
-//! What a service says of its samples, in its attributes.
+//! Writes and reads the attributes in which a service states the layout of its samples.
 //!
-//! `lager.schema` holds two hashes of layouts; a process that has others is refused. Only who
-//! creates a topic adds `lager.fields.0` to `.6`, the description of the payload in pieces, by
-//! which tools read samples that they have no type for. Nobody requires it, so that a process of
-//! plain iceoryx2 may create a topic without it.
+//! `lager.schema` holds two hashes of layouts; a process with other hashes may not open the
+//! service. The process that creates a topic adds `lager.fields.0` to `.6`: the description of the
+//! payload in pieces. Tools without the payload's type read samples by this description. No process
+//! demands a description, so a program of plain iceoryx2 can create a topic without one.
 
 use std::fmt::Write;
 
 use iceoryx2::prelude::{AttributeSpecifier, AttributeVerifier, SemanticString};
 use iceoryx2::service::attribute::{AttributeKey, AttributeSet, AttributeValue};
-use lager_topics::{Description, Make, Schema, Stamp, describe};
+use lager_sample::{Description, Make, Schema, Stamp, describe};
 
 use crate::fault::Difference;
 
@@ -18,18 +18,18 @@ const FIELDS: &str = "lager.fields.";
 
 /// Bytes of one attribute's value.
 const PIECE: usize = 256;
-/// Attributes of a service besides the schema.
+/// Attributes for the description, besides `lager.schema`.
 const PIECES: usize = 7;
 
-/// What both sides must share: a difference refuses the service.
+/// The attribute in which both sides must agree; otherwise the service cannot be opened.
 pub(crate) fn required(layout: [u64; 2]) -> AttributeVerifier {
     AttributeVerifier::new()
         .require(&key(SCHEMA), &hashes(layout))
         .expect("one attribute fits")
 }
 
-/// What a topic's creator says of it. A description that is too long is left out, and the topic can
-/// then be read only by who has its type.
+/// The attributes of a topic that this process creates. A description that is too long is left out;
+/// then only programs with the payload's type can read the topic.
 pub(crate) fn stated(make: &Make, layout: [u64; 2]) -> AttributeSpecifier {
     let mut stated = AttributeSpecifier::new()
         .define(&key(SCHEMA), &hashes(layout))
@@ -47,7 +47,7 @@ pub(crate) fn stated(make: &Make, layout: [u64; 2]) -> AttributeSpecifier {
     stated
 }
 
-/// The description that a topic's creator gave, if the topic has this build's header.
+/// The description that a topic's creator stated, if the topic's header is the one of this build.
 pub(crate) fn described(attributes: &AttributeSet) -> Result<Description, Difference> {
     let value = |name: &str| attributes.key_value(&key(name), 0);
     let schema = value(SCHEMA).ok_or(Difference::Undescribed)?;

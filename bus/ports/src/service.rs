@@ -1,11 +1,12 @@
-//! Opening services: names, limits, the layout check, and what each refusal means.
+//! Opens services of iceoryx2: their names, limits and layout check, and what each refusal means.
 //!
-//! The public service of a topic admits 64 observers, twice its actors and 8 further subscribers
-//! (`Qos::max_subscribers`). So keepers and restarted services get a place even when observers
-//! have taken all of theirs; the 65th observer is counted and refused. The actors' own service,
-//! where a topic has one, admits actors only (`Qos::max_acting`). Both have the same layout,
-//! queue and history, and a process that has the actors' service open has the public one open too.
-//! So a tool that knows the topic's name finds the topic as long as anybody uses it.
+//! The public service of a topic has places for its observers, two for each actor, and some for
+//! further readers (`Qos::max_subscribers`). So keepers and restarted services get a place even
+//! when all places of observers are taken. A process counts the observers, itself included, and
+//! gives up its place if there are too many. The actors' own service, if a topic has one, admits
+//! actors only (`Qos::max_acting`). Both services have the same layout, queue and history. A
+//! process that has the actors' service open has the public one open too, so a tool finds each
+//! topic in use by its name.
 
 use iceoryx2::prelude::{PortFactory, Service, ServiceName};
 use iceoryx2::service::builder::event::EventOpenOrCreateError;
@@ -14,16 +15,16 @@ use iceoryx2::service::builder::request_response::RequestResponseOpenOrCreateErr
 use iceoryx2::service::messaging_pattern::MessagingPattern;
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
-use lager_topics::Description;
+use lager_home::{Shortage, UnitName};
+use lager_sample::Description;
 
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::fault::{Difference, Refusal, TransportFault};
 use crate::kind::{Bytes, Header, Kind, Question, Side};
-use crate::name::{self, RobotName};
+use crate::name;
 use crate::patience::{Fault, patiently};
 use crate::schema::{self, required};
-use crate::shortage::Shortage;
 use crate::transport::Ipc;
 
 /// Samples a subscriber may hold at the same time.
@@ -32,13 +33,13 @@ pub(crate) const MAX_HELD: usize = 4;
 /// Samples a publisher may have on loan at the same time.
 pub(crate) const MAX_LOANS: usize = 2;
 
-/// Clients, servers and processes of one request service; a killed one keeps its place until swept.
+/// Places for clients, servers and processes of a request; a sweep frees those of killed processes.
 pub(crate) const MAX_CLIENTS: usize = 32;
 pub(crate) const MAX_SERVERS: usize = 4;
 const MAX_REQUEST_NODES: usize = MAX_CLIENTS + MAX_SERVERS + 16;
 
-/// Listeners of plain iceoryx2 on one topic, and the highest number an event may have there: each
-/// number costs a listener time, and writers use 0 only.
+/// Places for listeners of plain iceoryx2 on one topic, and the highest event number there. Each
+/// number costs a listener time, and writers use only the number 0.
 const MAX_STANDARD_LISTENERS: usize = 16;
 const MAX_EVENT_ID: usize = 3;
 
@@ -48,14 +49,14 @@ pub(crate) type RequestService = request_response::PortFactory<Ipc, Bytes, Heade
 
 pub(crate) type EventService = event::PortFactory<Ipc>;
 
-/// Opens a service of a topic, or creates it with the limits of the table.
+/// Opens a service of a topic, or creates it with the limits that the table gives.
 pub(crate) fn topic(bus: &Bus, kind: &Kind, side: Side) -> Result<TopicService, PortError> {
     let name = side.name(kind.name);
     patiently(bus, kind.name, || {
         let qos = kind.qos;
         let nodes = qos.max_nodes();
         let limited = || {
-            Ok(builder(bus, bus.robot(), &name, &(kind.payload)())?
+            Ok(builder(bus, bus.unit(), &name, &kind.detail())?
                 .max_publishers(qos.max_publishers())
                 .max_subscribers(side.places(&qos))
                 .max_nodes(nodes)
@@ -64,26 +65,26 @@ pub(crate) fn topic(bus: &Bus, kind: &Kind, side: Side) -> Result<TopicService, 
                 .history_size(qos.history)
                 .enable_safe_overflow(true))
         };
-        match limited()?.open_with_attributes(&required(kind.layout)) {
+        match limited()?.open_with_attributes(&required(kind.layout())) {
             Err(PublishSubscribeOpenError::DoesNotExist) => limited()?
-                .create_with_attributes(&schema::stated(&kind.make, kind.layout))
+                .create_with_attributes(&schema::stated(&kind.make(), kind.layout()))
                 .map_err(|error| meant(kind.name, nodes, error)),
             opened => opened.map_err(|error| meant(kind.name, nodes, error)),
         }
     })
 }
 
-/// Opens a service of a robot's topic if it exists. Never creates it.
+/// Opens a service of a unit's topic if it exists. Never creates it.
 pub(crate) fn existing_topic(
     bus: &Bus,
-    robot: &RobotName,
+    unit: &UnitName,
     kind: &Kind,
     side: Side,
 ) -> Result<Option<TopicService>, PortError> {
     let name = side.name(kind.name);
     patiently(bus, kind.name, || {
-        match builder(bus, robot, &name, &(kind.payload)())?
-            .open_with_attributes(&required(kind.layout))
+        match builder(bus, unit, &name, &kind.detail())?
+            .open_with_attributes(&required(kind.layout()))
         {
             Ok(service) => Ok(Some(service)),
             Err(
@@ -95,11 +96,11 @@ pub(crate) fn existing_topic(
     })
 }
 
-/// Opens a service of a topic that this process need not know, with the description that its
-/// creator gave, if it exists.
+/// Opens a service of a topic that need not be in this process's table, and returns the description
+/// that the topic's creator stated. `None` if the topic does not exist.
 pub(crate) fn found(
     bus: &Bus,
-    robot: &RobotName,
+    unit: &UnitName,
     topic: &str,
     side: Side,
 ) -> Result<Option<(TopicService, Description)>, PortError> {
@@ -113,7 +114,7 @@ pub(crate) fn found(
         Fault::Lasting(PortError::OtherLayout { topic, difference })
     };
     patiently(bus, name, || {
-        let full = service_name(robot, name)?;
+        let full = service_name(bus, unit, name)?;
         let pattern = MessagingPattern::PublishSubscribe;
         let details = Ipc::details(&full, bus.transport(), pattern)
             .map_err(|_| Fault::Passing(TransportFault::InMotion))?;
@@ -128,7 +129,7 @@ pub(crate) fn found(
         if !is_as_described {
             return Err(differs(Difference::Type));
         }
-        match builder(bus, robot, name, &types.payload)?.open() {
+        match builder(bus, unit, name, &types.payload)?.open() {
             Ok(service) if service.attributes() == details.attributes() => {
                 Ok(Some((service, description)))
             }
@@ -148,17 +149,17 @@ pub(crate) fn found(
 )]
 fn builder(
     bus: &Bus,
-    robot: &RobotName,
+    unit: &UnitName,
     name: &str,
     payload: &TypeDetail,
 ) -> Result<iceoryx2::service::builder::publish_subscribe::Builder<Bytes, Header, Ipc>, Fault> {
     let builder = bus
         .node()
-        .service_builder(&service_name(robot, name)?)
+        .service_builder(&service_name(bus, unit, name)?)
         .publish_subscribe::<Bytes>()
         .user_header::<Header>();
-    // SAFETY: both are of the types that the typed ports read and write, or that the service says
-    // itself.
+    // SAFETY: the header is the one that the typed ports use. The payload is theirs too, or the one
+    // that the service itself states.
     Ok(unsafe {
         builder
             .__internal_set_payload_type_details(payload)
@@ -175,11 +176,11 @@ pub(crate) fn request(bus: &Bus, question: &Question) -> Result<RequestService, 
     patiently(bus, question.name, || {
         let builder = bus
             .node()
-            .service_builder(&service_name(bus.robot(), question.name)?)
+            .service_builder(&service_name(bus, bus.unit(), question.name)?)
             .request_response::<Bytes, Bytes>()
             .request_user_header::<Header>()
             .response_user_header::<Header>();
-        // SAFETY: all are of the types that the typed ends read and write.
+        // SAFETY: the typed ends read and write exactly these types.
         let builder = unsafe {
             builder
                 .__internal_set_request_payload_type_details(&(question.request)())
@@ -197,7 +198,7 @@ pub(crate) fn request(bus: &Bus, question: &Question) -> Result<RequestService, 
             .max_borrowed_responses_per_pending_response(1)
             .enable_safe_overflow_for_requests(true)
             .enable_safe_overflow_for_responses(true)
-            // A request whose asker has given up must not be carried out later.
+            // So that no server carries out a request whose asker has given up.
             .enable_fire_and_forget_requests(false)
             .open_or_create_with_attributes(&required(question.layout))
             .map_err(|error| {
@@ -216,7 +217,7 @@ pub(crate) fn request(bus: &Bus, question: &Question) -> Result<RequestService, 
 pub(crate) fn event(bus: &Bus, kind: &Kind) -> Result<EventService, PortError> {
     patiently(bus, kind.name, || {
         bus.node()
-            .service_builder(&service_name(bus.robot(), kind.name)?)
+            .service_builder(&service_name(bus, bus.unit(), kind.name)?)
             .event()
             .max_listeners(MAX_STANDARD_LISTENERS)
             .max_notifiers(kind.qos.max_publishers())
@@ -235,8 +236,9 @@ pub(crate) fn event(bus: &Bus, kind: &Kind) -> Result<EventService, PortError> {
     })
 }
 
-fn service_name(robot: &RobotName, topic: &str) -> Result<ServiceName, Fault> {
-    ServiceName::new(&name::service(robot, topic)).map_err(|_| {
+fn service_name(bus: &Bus, unit: &UnitName, topic: &str) -> Result<ServiceName, Fault> {
+    let name = name::service(bus.application(), unit, topic);
+    ServiceName::new(&name).map_err(|_| {
         Fault::Lasting(PortError::Transport {
             topic: topic.to_owned(),
             fault: TransportFault::NameTooLong,
@@ -244,7 +246,7 @@ fn service_name(robot: &RobotName, topic: &str) -> Result<ServiceName, Fault> {
     })
 }
 
-/// What a refusal means for the topic or request called `name`.
+/// The error that a refusal means for the topic or request called `name`.
 fn meant(name: &str, nodes: usize, refusal: impl Into<Refusal>) -> Fault {
     let topic = name.to_owned();
     match refusal.into() {
@@ -261,7 +263,7 @@ fn meant(name: &str, nodes: usize, refusal: impl Into<Refusal>) -> Fault {
     }
 }
 
-/// A port that could not be made for want of resources.
+/// The error of a port that could not be made because a resource is used up.
 pub(crate) fn no_resources(topic: &str, fault: impl Into<TransportFault>) -> Fault {
     let topic = topic.to_owned();
     Fault::Lasting(match Shortage::now() {

@@ -1,24 +1,24 @@
-//! Reading ends whatever their payload is, for tools that show or keep samples.
+//! [`Source`]: a reading end with a payload of any type, for tools that show or record samples.
 
-use lager_topics::{Stamp, Topic};
+use lager_sample::{Stamp, Topic};
 use serde::Serialize;
 
 use crate::error::ReceiveError;
 use crate::found::Found;
 use crate::subscriber::Subscriber;
 
-/// Work to be done with one sample, whose payload serde writes.
+/// A function to be called with one sample, whose payload serde can serialize.
 pub trait Look {
-    /// What the work yields.
+    /// The function's result.
     type Output;
 
-    /// Does it. `lost` samples were missed so far, this one's own gap included.
+    /// The function. `lost` counts the samples missed so far, including the gap before this one.
     fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, payload: &P) -> Self::Output;
 }
 
-/// A reading end: of a topic of the table, or of one that brings its description along.
+/// A reading end of a topic, whether the topic is in the table or brings its own description.
 pub trait Source {
-    /// Looks at the next sample, oldest first; `None` when there is nothing more.
+    /// Calls `look` with the next sample, oldest first; `None` when there is no further sample.
     ///
     /// # Errors
     /// The transport failed.
@@ -27,10 +27,10 @@ pub trait Source {
     /// Samples missed, as [`Subscriber::lost`] counts them.
     fn lost(&self) -> u64;
 
-    /// Whether the topic holds its last sample for those who come later.
+    /// Whether the topic keeps its last sample for readers that come later.
     fn holds(&self) -> bool;
 
-    /// How many samples can wait for this end; one more overwrites the oldest.
+    /// How many samples can wait for this reader; one more overwrites the oldest.
     fn queue(&self) -> usize;
 }
 

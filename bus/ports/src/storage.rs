@@ -1,15 +1,15 @@
-//! A segment of the transport that can be opened without waiting for ever.
+//! [`Storage`]: iceoryx2's shared memory, with a limit on how long opening it waits.
 //!
-//! iceoryx2's storage in POSIX shared memory waits without limit for the creator of a segment that
-//! has no size yet. A process that was killed between `shm_open` and `ftruncate` leaves such a
-//! segment, and so can any process that may write to it; nobody could open it again. iceoryx2 also
-//! maps a segment that is too short for its value, and the first access then ends the process.
+//! iceoryx2 waits without limit for the creator of a segment that has no size yet. A process that
+//! was killed between `shm_open` and `ftruncate` leaves such a segment, and so can any process with
+//! the permission to write there; then nobody can open the segment again. iceoryx2 also maps a
+//! segment that is too short for its value, and the first access to it ends the process.
 //!
-//! This storage checks both first. It removes what a dead creator has left, waits for a living
-//! creator as long as any creation takes, and refuses a segment that is too short.
+//! This storage checks both first. It removes the segment of a dead creator, waits for a living
+//! creator longer than any creation takes, and refuses a segment that is too short.
 //!
-//! **Invariant:** all else is the transport's own storage. Names, hashes, sizes and modes are the
-//! same, so stock processes and ours share segments.
+//! **Invariant:** all else is iceoryx2's own storage. Names, hashes, sizes and modes are the same,
+//! so programs of plain iceoryx2 can share segments with this project's.
 
 use core::fmt::Debug;
 use core::mem::MaybeUninit;
@@ -34,17 +34,16 @@ use iceoryx2_cal::named_concept::{
     NamedConceptPathHintRemoveError, NamedConceptRemoveError, Path,
 };
 
-use crate::lease;
-use crate::shortage::SHARED_MEMORY;
+use lager_home::SHARED_MEMORY;
 
-/// Creating a segment takes microseconds; a creator that lives and has not set a size by then is
+/// Creating a segment takes microseconds. A living creator that has set no size after this time is
 /// stopped.
 const CREATION: Duration = Duration::from_millis(50);
 
 /// The version number that the transport puts before each value.
 const HEAD: u64 = 8;
 
-/// The transport's storage, opened with care.
+/// iceoryx2's storage, opened with these checks.
 #[derive(Debug)]
 pub(crate) struct Storage<T: Debug + Send + Sync + ZeroCopySend>(posix::Storage<T>);
 
@@ -58,8 +57,8 @@ pub(crate) struct Builder<'builder, T: Debug + Send + Sync + ZeroCopySend> {
 }
 
 impl<T: Debug + Send + Sync + ZeroCopySend> Builder<'_, T> {
-    /// Returns when the segment can be opened or is absent; opening then says which. A segment that
-    /// a dead process has not finished is removed.
+    /// Waits until the segment can be opened or is absent; opening it then shows which. Removes a
+    /// segment that a dead process has not finished.
     fn wait_for_size(&self) -> Result<(), DynamicStorageOpenError> {
         let file = self.config.path_for(&self.name).file_name().to_string();
         let segment = OsPath::new(SHARED_MEMORY).join(file);
@@ -72,7 +71,7 @@ impl<T: Debug + Send + Sync + ZeroCopySend> Builder<'_, T> {
             if readable && found.len() > 0 {
                 return Err(DynamicStorageOpenError::InternalError);
             }
-            if lease::remove_unused(&segment) {
+            if lager_home::remove_unused(&segment) {
                 continue;
             }
             if start.elapsed() >= self.timeout.max(CREATION) {
@@ -162,7 +161,7 @@ impl<T: Debug + Send + Sync + ZeroCopySend> NamedConceptMgmt for Storage<T> {
         name: &FileName,
         config: &Self::Configuration,
     ) -> Result<bool, NamedConceptRemoveError> {
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller's promises are passed on unchanged.
         unsafe { posix::Storage::<T>::remove_cfg(name, config) }
     }
 
@@ -185,7 +184,7 @@ impl<T: Debug + Send + Sync + ZeroCopySend> NamedConceptMgmt for Storage<T> {
 impl<T: Debug + Send + Sync + ZeroCopySend> Abandonable for Storage<T> {
     #[allow(unsafe_code, reason = "the trait's")]
     unsafe fn abandon_in_place(mut this: NonNull<Self>) {
-        // SAFETY: the caller's promises are passed on; the field is inside what they are about.
+        // SAFETY: the caller's promises are passed on; they hold for the field too.
         unsafe { posix::Storage::abandon_in_place(NonNull::from_mut(&mut this.as_mut().0)) };
     }
 }
@@ -219,7 +218,7 @@ impl<T: Debug + Send + Sync + ZeroCopySend> DynamicStorage<T> for Storage<T> {
         config: &mut Self::Configuration,
         type_name: &str,
     ) {
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller's promises are passed on unchanged.
         unsafe { posix::Storage::<T>::__internal_set_type_name_in_config(config, type_name) };
     }
 }

@@ -1,47 +1,46 @@
-//! How a reader judges stamps: exact loss accounting, and which of two samples is newer.
+//! How a reader counts lost samples exactly, and finds out which of two samples is newer.
 //!
 //! A stream is one life of a publisher, `(writer, epoch)`, numbered from 0 without gaps. This file
 //! is pure, so that its laws can be tested without a bus:
 //!
-//! - **received + lost = sent**, once a stream's last sample has been received, for every stream
-//!   that began after its reader attached. Of a stream that was there before, the reader counts
-//!   from the first sample that it receives. Samples that were overwritten before that are not
-//!   counted as lost, since it does not know how many of them were sent after it attached.
+//! - **received + lost = sent**, once the stream's last sample has been received, for every stream
+//!   that began after its reader attached. In an older stream, the reader counts from the first
+//!   sample that it receives. It does not count samples that were overwritten before that, because
+//!   it does not know how many of them were sent after it attached.
 //! - **A stamp may be false**, if its writer is damaged or foreign. So a gap counts only if that
-//!   many samples could have been sent since the stream was last heard; a later, lower number shows
-//!   that there was no gap; and a sample from the future is not newer than the present
+//!   many samples could have been sent since the stream's last sample. A later sample with a lower
+//!   number shows that there was no gap. And a sample from the future is not newer than the present
 //!   ([`Newest`]).
 //! - **A restart is not a loss.** A restarted writer has a new epoch and numbers from 0 again.
 
 use core::ops::Range;
 
-use lager_topics::Stamp;
+use lager_sample::Stamp;
 
-/// Streams remembered. A topic has at most some twenty writers at a time; the rest is for
-/// restarted ones, and the longest silent is forgotten first.
+/// How many streams a reader remembers. A topic has at most about twenty writers at a time; the
+/// rest is for restarted ones. The stream that has been silent longest is forgotten first.
 const REMEMBERED: usize = 128;
 
-/// The shortest time in which a writer can publish one sample after another, in ns; the fastest
-/// writer seen takes a multiple of it.
+/// The shortest time between two samples of one writer, in ns; several times shorter than measured.
 const SHORTEST_NS: u64 = 20;
 
-/// How far a stamp may be ahead of its reader's clock before it is ignored. All processes of a
-/// machine read the same clock, so no true stamp is ahead.
+/// A stamp that is further ahead of its reader's clock than this, in ns, is ignored. All processes
+/// of a machine read the same clock, so no true stamp is ahead.
 const AHEAD_NS: u64 = 1_000_000_000;
 
 struct Stream {
     writer: u32,
     epoch: u64,
     next: u64,
-    /// The numbers counted as missed by the last sample.
+    /// The numbers that the last sample skipped, which are counted as lost.
     gap: Range<u64>,
-    /// The stream's later samples were sent after this moment.
+    /// All later samples of the stream were sent after this moment.
     heard_ns: u64,
 }
 
 /// Counters over all streams of one topic.
 pub(crate) struct Streams {
-    /// Most recently heard first. Never grows beyond its first capacity.
+    /// The stream heard last comes first. Never grows beyond its first capacity.
     known: Vec<Stream>,
     attached_ns: u64,
     received: u64,
@@ -59,7 +58,7 @@ impl Streams {
         }
     }
 
-    /// Notes a received sample; `clock` is read where the stamp is not simply the next one.
+    /// Counts a received sample. Reads `clock` only if the stamp does not have the next number.
     pub(crate) fn note(&mut self, stamp: &Stamp, clock: impl Fn() -> u64) {
         self.received += 1;
         let found = self
@@ -83,13 +82,13 @@ impl Streams {
         }
     }
 
-    /// Takes up a stream that has not been heard before.
+    /// Starts to count a stream whose first sample has arrived.
     fn meet(&mut self, stamp: &Stamp, now_ns: u64) {
         if stamp.sequence > sendable(stamp.epoch, now_ns) {
             return;
         }
-        // A stream that is older than this reader begins with the first sample received. Of a
-        // younger stream everything before that sample was missed.
+        // If the stream is older than this reader, it counts from the first sample received. If it
+        // is younger, everything before that sample was missed.
         let is_younger = stamp.epoch > self.attached_ns;
         if is_younger {
             self.lost = self.lost.saturating_add(stamp.sequence);
@@ -124,16 +123,16 @@ impl Streams {
 }
 
 impl Stream {
-    /// Takes up a number that is not the next one. Returns how many losses that were counted before
-    /// are withdrawn, and how many are new.
+    /// Takes up a number that is not the next one. Returns how many losses counted earlier turn out
+    /// to be none, and how many losses are new.
     fn jump(&mut self, stamp: &Stamp, now_ns: u64) -> (u64, u64) {
         let mut withdrawn = 0;
         if stamp.sequence < self.next {
             if !self.gap.contains(&stamp.sequence) {
-                // It was there before: a repetition.
+                // The sample was received before and is repeated.
                 return (0, 0);
             }
-            // Numbers only grow, so the sample behind the gap was not this writer's.
+            // Numbers only grow, so the sample after the gap was not from this writer.
             withdrawn = self.gap.end - self.gap.start;
             self.next = self.gap.start;
             self.gap = 0..0;
@@ -156,14 +155,14 @@ fn sendable(since_ns: u64, now_ns: u64) -> u64 {
 }
 
 /// When the newest sample of a state that a reader has taken was published. Samples of several
-/// writers come in no order, and a keeper's may be older than one seen.
+/// writers arrive in any order, and a keeper may send an older sample than one already seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Newest {
     publish_ns: u64,
 }
 
 impl Newest {
-    /// Whether a sample published at `publish_ns` takes the place of what was taken before.
+    /// Whether a sample published at `publish_ns` replaces the one taken before.
     pub(crate) fn takes(&mut self, publish_ns: u64, now_ns: u64) -> bool {
         if publish_ns < self.publish_ns || publish_ns > now_ns.saturating_add(AHEAD_NS) {
             return false;

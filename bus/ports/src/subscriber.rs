@@ -1,14 +1,14 @@
-//! The reading end of a topic.
+//! [`Subscriber`]: receives the samples of a topic.
 
 use core::fmt;
 use core::marker::PhantomData;
 use core::ops::Deref;
 
-use lager_topics::{Stamp, Topic};
+use lager_home::Clock;
+use lager_sample::{Stamp, Topic};
 
 use crate::bus::Bus;
 use crate::cause::Cause;
-use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError};
 use crate::kind::Kind;
 use crate::untyped::{Reader, Taken};
@@ -27,8 +27,8 @@ impl<T: Topic> Subscriber<T> {
         })
     }
 
-    /// The next sample, oldest first; `None` when there is nothing more. Of a state the older
-    /// values come first, too: whoever acts on it calls [`Subscriber::latest`].
+    /// The next sample, oldest first; `None` when there is no further sample. A state's older
+    /// values come first too; to act on a state, call [`Subscriber::latest`].
     ///
     /// # Errors
     /// Too many samples are held, or the transport failed.
@@ -36,29 +36,30 @@ impl<T: Topic> Subscriber<T> {
         Ok(self.reader.receive()?.map(Sample::of))
     }
 
-    /// Drains the topic and returns what was published last; `None` if there is nothing newer
-    /// than what this returned before. For topics that carry a state.
+    /// Receives all waiting samples and returns the one published last; `None` if none is newer
+    /// than the sample returned before. For topics that carry a state.
     ///
-    /// A failure on the way leaves what was drained before it; if it lasts, the next call tells.
+    /// If it fails midway, it returns what it found before; a lasting failure comes with the next
+    /// call.
     ///
     /// # Errors
-    /// As [`Subscriber::receive`], if nothing newer came before the failure; at most two samples
-    /// may be held meanwhile.
+    /// As [`Subscriber::receive`], if no newer sample came before the failure. The caller may hold
+    /// at most two samples during the call.
     pub fn latest(&mut self) -> Result<Option<Sample<T>>, ReceiveError> {
         Ok(self.reader.latest()?.map(Sample::of))
     }
 
-    /// Writers that this reader could not connect to, now or earlier: they were killed, or this
-    /// process has no resources left. Their samples do not arrive.
+    /// How many writers this reader could not connect to, now or earlier: a writer was killed, or
+    /// this process has no resources left. Samples of such writers do not arrive.
     pub fn unreached(&self) -> u32 {
         self.reader.unreached()
     }
 
-    /// Samples missed, exactly, over all writers: every number that was skipped, and for a writer
-    /// younger than this subscriber also what came before the first sample received. Known up to
-    /// the last sample received. A restarted writer is no loss.
+    /// How many samples this reader missed, exactly, over all writers: every number that was
+    /// skipped, and for a writer younger than this subscriber also the numbers before the first
+    /// sample received. Up to date at each received sample. A restarted writer is not a loss.
     ///
-    /// A writer that came and went while nothing was received is not counted.
+    /// A writer that came and went while this reader received nothing is not counted.
     pub fn lost(&self) -> u64 {
         self.reader.streams().lost()
     }
@@ -68,7 +69,7 @@ impl<T: Topic> Subscriber<T> {
         self.reader.streams().received()
     }
 
-    /// Writers heard so far, a restarted one counting again.
+    /// How many writers were heard so far; a restarted writer counts again.
     pub fn writers_heard(&self) -> usize {
         self.reader.streams().heard()
     }
@@ -85,7 +86,7 @@ impl<T: Topic> fmt::Debug for Subscriber<T> {
     }
 }
 
-/// A received sample, read where the writer wrote it. At most four may be held at a time.
+/// A received sample, read where the writer wrote it. A reader may hold at most four at a time.
 pub struct Sample<T: Topic> {
     taken: Taken,
     topic: PhantomData<T>,
@@ -99,13 +100,13 @@ impl<T: Topic> Sample<T> {
         }
     }
 
-    /// The stamp: when, why and by whom it was published, and its number.
+    /// The stamp: when, why and by which process the sample was published, and its number.
     pub fn stamp(&self) -> &Stamp {
         self.taken.stamp()
     }
 
-    /// This sample as the cause of others, received now. Call it right after receiving. It reads
-    /// the clock, so do not call it for samples that are only looked at.
+    /// This sample, received now, as the cause of another sample. Call it right after receiving. It
+    /// reads the clock, so call it only for samples that cause others.
     pub fn cause(&self) -> Cause {
         Cause::sample::<T>(self.stamp(), Clock::monotonic_ns())
     }
@@ -119,8 +120,8 @@ impl<T: Topic> Deref for Sample<T> {
         reason = "the sample knows where its payload is, not what"
     )]
     fn deref(&self) -> &T::Payload {
-        // SAFETY: the reader was made with `Kind::of::<T>()`, so a payload is there, of which any
-        // bytes are one; the sample is held, and its writer does not touch it meanwhile.
+        // SAFETY: the reader was made with `Kind::of::<T>()`, so a payload is there, and any bytes
+        // are a valid one. The reader holds the sample, so the writer does not change it.
         unsafe { self.taken.payload().cast().as_ref() }
     }
 }

@@ -1,10 +1,10 @@
-//! Removing what killed processes left behind.
+//! Removes from the bus what killed processes left behind.
 //!
 //! The transport does nearly all of it, but leaves two kinds of node for ever. It cannot remove a
-//! node that was killed while it wrote one of its tags, because its list leaves that tag out and
-//! the node's folder is then never empty. And it cannot remove a node that was killed while it took
-//! itself down, because it looks for a node without details on another bus. So this module removes
-//! the files of the first before the transport's sweep, and those of the second in its place; only
+//! node that was killed while it wrote one of its tags: its list leaves that tag out, so the node's
+//! folder never gets empty. And it cannot remove a node that was killed while it removed itself:
+//! for a node without details it looks on another bus. So this module removes the files of the
+//! first kind before the transport's sweep, and the files of the second kind in its place. Only
 //! then is the node's name free again.
 
 use std::fs::{self, DirEntry};
@@ -26,10 +26,10 @@ use iceoryx2_cal::named_concept::{
 
 use crate::transport::Ipc;
 
-/// Where the transport's nodes say that they live.
+/// The files with which the transport's nodes show that they live.
 type Monitors = <Ipc as Service>::Monitoring;
 
-/// How long a sweep waits for another one that has the same dead process in hand.
+/// How long a sweep waits for another sweep that is removing the same dead process.
 const OTHERS_SWEEP: Duration = Duration::from_millis(100);
 
 /// The mode of a tag file while it is being written (iceoryx2-cal's
@@ -51,8 +51,8 @@ pub(crate) fn dead_nodes(config: &Config) -> Result<usize, NodeListFailure> {
     Ok(removed)
 }
 
-/// Whether the process of every node lives. The transport's list of nodes would tell, too, but it
-/// reads the details of each.
+/// Whether the process of every node lives. The transport's list of nodes says this too, but reads
+/// the details of each node.
 fn all_live(config: &Config) -> bool {
     let monitors = monitors(config);
     let Ok(names) = Monitors::list_cfg(&monitors) else {
@@ -67,8 +67,8 @@ fn all_live(config: &Config) -> bool {
     names.iter().all(lives)
 }
 
-/// Whether the files by which others find this node are there. Writing the tag of a port makes the
-/// folder again, but the details are only written with the node.
+/// Whether the files exist by which others find this node. Creating a port makes the folder again
+/// if it is gone, but the details are written only with the node.
 pub(crate) fn is_listed(config: &Config, node: &Node<Ipc>) -> bool {
     let beside = PathBuf::from(config.global.node_dir().to_string());
     beside
@@ -80,17 +80,17 @@ pub(crate) fn is_listed(config: &Config, node: &Node<Ipc>) -> bool {
 fn remove(config: &Config, dead: DeadNodeView<Ipc>) -> bool {
     let files = Files::of(config, &dead);
     if dead.details().is_none() {
-        // A node removes its ports before its details. Details that are there but cannot be read,
-        // for want of rights or of files, are of a node that may have ports.
+        // A node removes its ports before its details. If the details exist but cannot be read (no
+        // permission, or too many open files), the node may still have ports.
         return files.are_without_details() && files.remove_as_cleaner(config);
     }
     files.remove_half_written_tags();
     dead.blocking_remove_stale_resources(OTHERS_SWEEP).is_ok()
 }
 
-/// A node's files: a folder of tags and details, and beside it some with the node's name.
+/// A node's files: its folder of tags and details, and the files beside the folder with its name.
 struct Files {
-    /// The node's name among its monitors.
+    /// The node's name among the files of `Monitors`.
     id: String,
     details: PathBuf,
     folder: PathBuf,
@@ -115,9 +115,9 @@ impl Files {
         }
     }
 
-    /// Needs no cleaner's lock: only the node's own process writes tags into this folder, a node is
-    /// listed as dead only when the kernel has taken that process's lock back or the process has
-    /// already removed the folder itself, and no other node ever has the same number.
+    /// Needs no cleaner's lock. Only the node's own process writes tags into this folder. A node is
+    /// listed as dead only when the kernel has released that process's lock or the process has
+    /// removed the folder itself. And no other node ever gets the same number.
     fn remove_half_written_tags(&self) {
         for tag in entries(&self.folder) {
             let mode = tag.metadata().map(|tag| tag.permissions().mode() & 0o777);
@@ -127,8 +127,8 @@ impl Files {
         }
     }
 
-    /// Removes them all, those beside the folder by giving the cleaner's lock back; says whether
-    /// nothing is left. Without that lock another process may be sweeping the same node.
+    /// Removes all files; those beside the folder go when the cleaner's lock is given back. Returns
+    /// whether nothing is left. Without that lock, another process may be sweeping the same node.
     fn remove_as_cleaner(&self, config: &Config) -> bool {
         let Some(cleaner) = cleaner(config, &self.id) else {
             return false;
@@ -145,7 +145,7 @@ impl Files {
     }
 }
 
-/// The transport's lock on what a dead node has left. Nobody gets it for a living one.
+/// The transport's lock on the files of a dead node. Nobody gets the lock of a living node.
 fn cleaner(config: &Config, id: &str) -> Option<<Monitors as Monitoring>::Cleaner> {
     let name = FileName::new(id.as_bytes()).ok()?;
     <Monitors as Monitoring>::Builder::new(&name)
@@ -154,7 +154,7 @@ fn cleaner(config: &Config, id: &str) -> Option<<Monitors as Monitoring>::Cleane
         .ok()
 }
 
-/// Where the monitors of a bus are, and how they are named.
+/// The folder and the names of a bus's monitors.
 fn monitors(config: &Config) -> <Monitors as NamedConceptMgmt>::Configuration {
     let global = &config.global;
     <Monitors as NamedConceptMgmt>::Configuration::default()
@@ -168,7 +168,7 @@ fn details_name(config: &Config) -> String {
     format!("{}node{}", global.prefix, global.node.static_config_suffix)
 }
 
-/// What a folder contains; nothing if it cannot be read, as the next sweep sees it again.
+/// The entries of a folder; none if it cannot be read, because the next sweep tries again.
 fn entries(folder: &PathBuf) -> Vec<DirEntry> {
     fs::read_dir(folder)
         .into_iter()
@@ -177,7 +177,7 @@ fn entries(folder: &PathBuf) -> Vec<DirEntry> {
         .collect()
 }
 
-/// Another sweep may have been first.
+/// Another sweep may have removed the file first.
 fn remove_file(file: &DirEntry) {
     let _ = fs::remove_file(file.path());
 }

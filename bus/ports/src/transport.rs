@@ -1,15 +1,15 @@
-//! The service type with which `ports` opens iceoryx2.
+//! [`Ipc`]: the service type with which this crate opens iceoryx2.
 //!
-//! It is iceoryx2's `ipc::Service` in all but two things. What a port or a loan shares with its
+//! It is iceoryx2's `ipc::Service` except for two things. What a port or a loan shares with its
 //! handles lives in a [`Pooled`] instead of an `Rc`, so that loaning does not allocate: iceoryx2's
 //! own `loan` allocates one small cell each time, and `tests/allocation.rs` counts 0 allocations a
 //! frame over bridge and logic together. And segments are opened as a [`Storage`], which does not
 //! wait for ever for a segment that was never finished. Everything that another process can see
-//! (files, names, hashes, layouts and locks) is taken from `ipc::Service` itself. So stock
-//! processes, tools and bindings of the same version can publish to our ports and subscribe from
-//! them (tests/bus/interop.rs).
+//! (files, names, hashes, layouts and locks) is that of `ipc::Service`. So programs, tools and
+//! bindings of plain iceoryx2, in the same version, can publish to this project's subscribers and
+//! subscribe to its publishers (tests/bus/interop.rs).
 //!
-//! **Invariant:** `ipc::Service` is named here only; like its ports, ours stay in their thread.
+//! **Invariant:** only this file names `ipc::Service`. Like its ports, ours stay in one thread.
 
 use core::fmt::Debug;
 
@@ -28,7 +28,7 @@ use iceoryx2_cal::zero_copy_connection::common::details::{Connection, SharedMana
 use crate::pooled::Pooled;
 use crate::storage::Storage;
 
-/// iceoryx2 between processes, without the heap. Only a name for types: it has no values.
+/// iceoryx2 between processes, with fewer allocations. Only a name for types: it has no values.
 #[derive(Clone, Debug)]
 pub(crate) enum Ipc {}
 

@@ -1,17 +1,18 @@
-//! The hot path does not allocate: a counting allocator proves it.
+//! Proves with a counting allocator that the hot path does not allocate.
 //!
-//! Loaning, sending, ringing, waiting, receiving, ticking and counting losses allocate nothing once
-//! the ends have met.
+//! Once writers and readers have met, loaning, sending, ringing, waiting, receiving, ticking and
+//! counting losses allocate nothing.
 //!
-//! A binary of its own, since the allocator counts for the whole process. One test only, so that
-//! nothing else runs meanwhile; what other threads do is not counted.
+//! This is a program of its own because the allocator counts for the whole process. It has only one
+//! test, so that nothing else runs meanwhile; allocations of other threads do not count.
 
 use std::time::Duration;
 
-use lager_ports::{Bus, BusConfig, Cause, Policy, Wake};
+use lager_ports::{Bus, BusConfig, Cause};
 use lager_rig::Domain;
 use lager_rig::allocations::{Counting, of as allocations};
 use lager_topics::{LinkHealth, Role, SensorLine, SteeringCommand};
+use lager_wake::{Policy, Wake};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -27,7 +28,7 @@ fn nothing_is_allocated_per_frame() {
     }
 }
 
-/// Sensor frame to order, again and again, with observers attached.
+/// From sensor frame to order, again and again, with observers attached.
 fn exchange(config: &BusConfig, policy: Policy) {
     let bridge = Bus::open(config, Role::Bridge).unwrap();
     let logic = Bus::open(config, Role::Logic).unwrap();
@@ -48,7 +49,7 @@ fn exchange(config: &BusConfig, policy: Policy) {
         frame.send().unwrap();
     };
     let order = || orders.send(Cause::event(5), Default::default()).unwrap();
-    // As many as may be open at a time; none was open beside another during start-up.
+    // As many loans as may be open at a time. During start-up only one was open at a time.
     let unsent = || drop((orders.loan().unwrap(), orders.loan().unwrap()));
     let mut receive = || {
         assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
@@ -65,7 +66,7 @@ fn exchange(config: &BusConfig, policy: Policy) {
         assert!(line.receive().unwrap().is_none());
     };
 
-    // Start-up: the ends meet, and their streams become known.
+    // Start-up: writers and readers meet, and readers learn the writers' streams.
     health_out.send(Cause::OWN, Default::default()).unwrap();
     frame();
     receive();

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 from matplotlib.collections import LineCollection
 
 from lagerrobot import Bag
-from lagerrobot.layouts import EventKind, GoodState, Phase, Side
+from lagerrobot.layouts import EventKind, GoodState, Heading, Phase
 
 # Phases in which the robot does the same for a person who looks, each with its colour.
 DOING = {
@@ -33,7 +33,7 @@ DOING = {
     "looks": ("tab:purple", {Phase.Looking}),
 }
 EVENTS = {EventKind.InPosition: "at the goods", EventKind.ItemDelivered: "delivered"}
-MIDDLE = {Side.Left: (0, 0.5), Side.Right: (1, 0.5), Side.Up: (0.5, 1), Side.Down: (0.5, 0)}
+MIDDLE = {Heading.Left: (0, 0.5), Heading.Right: (1, 0.5), Heading.Up: (0.5, 1), Heading.Down: (0.5, 0)}
 
 
 def read(path):

@@ -4,7 +4,7 @@
 
     with Robot("r1") as robot:
         for sample in robot.topic("sensor/line"):
-            print(sample.stamp.sequence, sample.data.bits)
+            print(sample.stamp.sequence, sample.data.state)  # 0: on the line
 
 A sample lies in shared memory and is not copied. It lives until the next one is taken;
 `sample.copy()` keeps its payload. `Bag("tour.mcap")` reads a recording in the same way, up to its

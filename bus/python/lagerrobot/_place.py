@@ -1,4 +1,4 @@
-"""Where the bus lives: what `bus/ports/src/place.rs` decides, for one who only reads.
+"""Where the bus lives: what `bus/home/src/home.rs` decides, for one who only reads.
 
 Never makes a folder: where the robot's own programs have made none, there is nothing to read.
 """

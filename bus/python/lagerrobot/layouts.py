@@ -128,7 +128,7 @@ class FailureKind(enum.IntEnum):
     MapTooLarge = 21
     DeliveryOffCorner = 22
     SideUnknown = 23
-    SideTooShort = 24
+    SideWrong = 24
     TooManyProducts = 25
     ProductOutside = 26
     ProductTwice = 27
@@ -216,13 +216,6 @@ class Pick(enum.IntEnum):
     Auto = 1
 
 
-class Side(enum.IntEnum):
-    Left = 0
-    Up = 1
-    Right = 2
-    Down = 3
-
-
 class BlockSource(enum.IntEnum):
     Sensor = 0
     Person = 1
@@ -234,7 +227,7 @@ class TextKind(enum.IntEnum):
     Map = 2
 
 
-class ToldKind(enum.IntEnum):
+class NavigatorInputKind(enum.IntEnum):
     None_ = 0
     Tick = 1
     Line = 2
@@ -242,20 +235,32 @@ class ToldKind(enum.IntEnum):
     Steering = 4
     Map = 5
     Order = 6
-    Cancel = 7
-    MoveUp = 8
-    ClearQueue = 9
-    PickupDone = 10
-    Pick = 11
-    DrivenByHand = 12
-    Reset = 13
-    Placed = 14
-    Way = 15
-    Link = 16
-    Mode = 17
-    Renewed = 18
-    Repeated = 19
-    Goods = 20
+    Operator = 7
+    DrivenByHand = 8
+    Mode = 9
+    Renewed = 10
+    Repeated = 11
+
+
+class InputKind(enum.IntEnum):
+    PickupDone = 0
+    ResetPressed = 1
+    Placed = 2
+    PickupForced = 3
+    OrderCancelled = 4
+    OrderMovedUp = 5
+    QueueCleared = 6
+    LinkLost = 7
+    LinkBack = 8
+    SwitchedToManual = 9
+    SwitchedToAutonomous = 10
+    PickByHand = 11
+    PickByItself = 12
+    GoodsGone = 13
+    GoodsBack = 14
+    Horn = 15
+    WayBlocked = 16
+    WayOpened = 17
 
 
 class GoneWhy(enum.IntEnum):
@@ -274,25 +279,6 @@ class EventKind(enum.IntEnum):
     PickupRefused = 5
     Failed = 6
     WayBlocked = 7
-
-
-class InputKind(enum.IntEnum):
-    PickupDone = 0
-    SwitchPressed = 1
-    ResetPressed = 2
-    Placed = 3
-    PickupForced = 4
-    OrderCancelled = 5
-    OrderMovedUp = 6
-    QueueCleared = 7
-    LinkLost = 8
-    LinkBack = 9
-    SwitchedToManual = 10
-    SwitchedToAutonomous = 11
-    PickByHand = 12
-    PickByItself = 13
-    GoodsGone = 14
-    GoodsBack = 15
 
 
 class ThoughtKind(enum.IntEnum):
@@ -358,6 +344,7 @@ class ThoughtKind(enum.IntEnum):
     GoodsBack = 59
     AllGoodsBack = 60
     GoodsGone = 61
+    Honks = 62
 
 
 class Joint(enum.IntEnum):
@@ -536,7 +523,7 @@ class CalibratedSensor(Layout):
 
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0xA23DD5E510609C23
+    _hash_ = 0xE059903C197FB104
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),
@@ -549,7 +536,6 @@ class Health(Layout):
         ("orders_refused", ctypes.c_uint32),
         ("leases_expired", ctypes.c_uint32),
         ("refused_id", ctypes.c_uint32),
-        ("switch_ids", ctypes.c_uint32 * 4),
         ("next_lease_ms", ctypes.c_uint16),
         ("gain_p", ctypes.c_int16),
         ("gain_d", ctypes.c_int16),
@@ -575,16 +561,16 @@ class Health(Layout):
     ]
     _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ArmProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role}
     _dtype_ = {
-        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "stop_word", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
-        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", ("<u1", (1,))],
-        "offsets": [0, 48, 96, 104, 112, 120, 128, 132, 136, 140, 144, 148, 164, 166, 168, 170, 171, 172, 173, 174, 175, 176, 177, 178, 179, 180, 181, 182, 183, 184, 228, 229, 230, 231],
-        "itemsize": 232,
+        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "stop_word", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
+        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", ("<u1", (1,))],
+        "offsets": [0, 48, 96, 104, 112, 120, 128, 132, 136, 140, 144, 148, 150, 152, 154, 155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 212, 213, 214, 215],
+        "itemsize": 216,
     }
 
 
 class Failure(Layout):
     _type_name_ = "lager::Failure"
-    _hash_ = 0x9E6CD244B755E4C8
+    _hash_ = 0xE09B50DE2397B271
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
@@ -604,7 +590,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x3231D9D18DC65B83
+    _hash_ = 0x470296B29CD108E7
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -655,7 +641,7 @@ class NavigatorStatus(Layout):
 
 class MapProduct(Layout):
     _type_name_ = "lager::MapProduct"
-    _hash_ = 0x809EDEFAB8000AE3
+    _hash_ = 0x8E50683A44F0B502
     _fields_ = [
         ("id", ctypes.c_int32),
         ("x", ctypes.c_uint8),
@@ -663,7 +649,7 @@ class MapProduct(Layout):
         ("side", ctypes.c_uint8),
         ("reserved", ctypes.c_uint8),
     ]
-    _enums_ = {"side": Side}
+    _enums_ = {"side": Heading}
     _dtype_ = {
         "names": ["id", "x", "y", "side", "reserved"],
         "formats": ["<i4", "<u1", "<u1", "<u1", "<u1"],
@@ -674,7 +660,7 @@ class MapProduct(Layout):
 
 class WarehouseMap(Layout):
     _type_name_ = "lager::WarehouseMap"
-    _hash_ = 0x6424C06972BB8591
+    _hash_ = 0x2678B45F9D728754
     _fields_ = [
         ("width", ctypes.c_uint8),
         ("height", ctypes.c_uint8),
@@ -782,58 +768,27 @@ class Sent(Layout):
     }
 
 
-class Told(Layout):
-    _type_name_ = "lager::Told"
-    _hash_ = 0x44368F18AF474376
+class NavigatorInput(Layout):
+    _type_name_ = "lager::NavigatorInput"
+    _hash_ = 0x131E0E170D2EC01C
     _fields_ = [
         ("time_ns", ctypes.c_uint64),
         ("number", ctypes.c_uint64),
-        ("product", ctypes.c_int32),
         ("proof", ctypes.c_uint32),
         ("command_id", ctypes.c_uint32),
         ("kind", ctypes.c_uint8),
         ("value", ctypes.c_uint8),
         ("flag", ctypes.c_uint8),
-        ("x", ctypes.c_uint8),
-        ("y", ctypes.c_uint8),
-        ("heading", ctypes.c_uint8),
         ("code", ctypes.c_uint8),
         ("arm_granted", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 4),
+        ("reserved", ctypes.c_uint8 * 3),
     ]
-    _enums_ = {"kind": ToldKind, "heading": Heading}
+    _enums_ = {"kind": NavigatorInputKind}
     _dtype_ = {
-        "names": ["time_ns", "number", "product", "proof", "command_id", "kind", "value", "flag", "x", "y", "heading", "code", "arm_granted", "reserved"],
-        "formats": ["<u8", "<u8", "<i4", "<u4", "<u4", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (4,))],
-        "offsets": [0, 8, 16, 20, 24, 28, 29, 30, 31, 32, 33, 34, 35, 36],
-        "itemsize": 40,
-    }
-
-
-class ToldInputs(Layout):
-    _type_name_ = "lager::ToldInputs"
-    _hash_ = 0x71C0A11A07B132DD
-    _fields_ = [
-        ("first", ctypes.c_uint64),
-        ("commands", Sent),
-        ("statuses", Sent),
-        ("events", Sent),
-        ("text_left", ctypes.c_uint32),
-        ("text_used", ctypes.c_uint16),
-        ("text_kind", ctypes.c_uint8),
-        ("entries_used", ctypes.c_uint8),
-        ("reports_used", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 7),
-        ("entries", Told * 24),
-        ("reports", SteeringReport * 8),
-        ("text", ctypes.c_uint8 * 32 * 16),
-    ]
-    _enums_ = {"text_kind": TextKind}
-    _dtype_ = {
-        "names": ["first", "commands", "statuses", "events", "text_left", "text_used", "text_kind", "entries_used", "reports_used", "reserved", "entries", "reports", "text"],
-        "formats": ["<u8", Sent._dtype_, Sent._dtype_, Sent._dtype_, "<u4", "<u2", "<u1", "<u1", "<u1", ("<u1", (7,)), (Told._dtype_, (24,)), (SteeringReport._dtype_, (8,)), (("<u1", (32,)), (16,))],
-        "offsets": [0, 8, 24, 40, 56, 60, 62, 63, 64, 65, 72, 1032, 1480],
-        "itemsize": 1992,
+        "names": ["time_ns", "number", "proof", "command_id", "kind", "value", "flag", "code", "arm_granted", "reserved"],
+        "formats": ["<u8", "<u8", "<u4", "<u4", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,))],
+        "offsets": [0, 8, 16, 20, 24, 25, 26, 27, 28, 29],
+        "itemsize": 32,
     }
 
 
@@ -850,6 +805,57 @@ class Order(Layout):
         "formats": ["<u4", "<i4"],
         "offsets": [0, 4],
         "itemsize": 8,
+    }
+
+
+class Input(Layout):
+    _type_name_ = "lager::Input"
+    _hash_ = 0x3259F9236B892827
+    _fields_ = [
+        ("kind", ctypes.c_uint8),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("order_id", ctypes.c_uint32),
+        ("id", ctypes.c_uint32),
+    ]
+    _enums_ = {"kind": InputKind, "heading": Heading}
+    _dtype_ = {
+        "names": ["kind", "x", "y", "heading", "order_id", "id"],
+        "formats": ["<u1", "<u1", "<u1", "<u1", "<u4", "<u4"],
+        "offsets": [0, 1, 2, 3, 4, 8],
+        "itemsize": 12,
+    }
+
+
+class NavigatorInputs(Layout):
+    _type_name_ = "lager::NavigatorInputs"
+    _hash_ = 0xBB3F5171923A8677
+    _fields_ = [
+        ("first", ctypes.c_uint64),
+        ("commands", Sent),
+        ("statuses", Sent),
+        ("events", Sent),
+        ("text_left", ctypes.c_uint32),
+        ("text_used", ctypes.c_uint16),
+        ("text_kind", ctypes.c_uint8),
+        ("entries_used", ctypes.c_uint8),
+        ("reports_used", ctypes.c_uint8),
+        ("orders_used", ctypes.c_uint8),
+        ("operator_used", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 5),
+        ("entries", NavigatorInput * 24),
+        ("reports", SteeringReport * 8),
+        ("orders", Order * 4),
+        ("operator", Input * 4),
+        ("text", ctypes.c_uint8 * 32 * 16),
+    ]
+    _enums_ = {"text_kind": TextKind}
+    _dtype_ = {
+        "names": ["first", "commands", "statuses", "events", "text_left", "text_used", "text_kind", "entries_used", "reports_used", "orders_used", "operator_used", "reserved", "entries", "reports", "orders", "operator", "text"],
+        "formats": ["<u8", Sent._dtype_, Sent._dtype_, Sent._dtype_, "<u4", "<u2", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (5,)), (NavigatorInput._dtype_, (24,)), (SteeringReport._dtype_, (8,)), (Order._dtype_, (4,)), (Input._dtype_, (4,)), (("<u1", (32,)), (16,))],
+        "offsets": [0, 8, 24, 40, 56, 60, 62, 63, 64, 65, 66, 67, 72, 840, 1288, 1320, 1368],
+        "itemsize": 1880,
     }
 
 
@@ -913,7 +919,7 @@ class OrderQueue(Layout):
 
 class Event(Layout):
     _type_name_ = "lager::Event"
-    _hash_ = 0xA1CA29E2F219615A
+    _hash_ = 0x3385803A4FFBD6E2
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -932,29 +938,9 @@ class Event(Layout):
     }
 
 
-class Input(Layout):
-    _type_name_ = "lager::Input"
-    _hash_ = 0x88E5E05C5B61411D
-    _fields_ = [
-        ("kind", ctypes.c_uint8),
-        ("x", ctypes.c_uint8),
-        ("y", ctypes.c_uint8),
-        ("heading", ctypes.c_uint8),
-        ("order_id", ctypes.c_uint32),
-        ("id", ctypes.c_uint32),
-    ]
-    _enums_ = {"kind": InputKind, "heading": Heading}
-    _dtype_ = {
-        "names": ["kind", "x", "y", "heading", "order_id", "id"],
-        "formats": ["<u1", "<u1", "<u1", "<u1", "<u4", "<u4"],
-        "offsets": [0, 1, 2, 3, 4, 8],
-        "itemsize": 12,
-    }
-
-
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0x99542D081AF03BDF
+    _hash_ = 0xDC9B4EDA7934FA9A
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),
@@ -1157,7 +1143,7 @@ TOPICS = {
     ),
     "nav/inputs": TopicEntry(
         "nav/inputs",
-        ToldInputs,
+        NavigatorInputs,
         Qos(64, 0, 4, 72, 92),
         "What the navigator was told, in pieces, with proofs of what it did: for `bag play --verify`.",
     ),
@@ -1182,7 +1168,7 @@ TOPICS = {
     "operator/input": TopicEntry(
         "operator/input",
         Input,
-        Qos(16, 0, 18, 76, 110),
+        Qos(16, 0, 18, 74, 108),
         "Buttons and acknowledgements of a person.",
     ),
     "log/thought": TopicEntry(

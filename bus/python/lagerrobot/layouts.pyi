@@ -118,7 +118,7 @@ class FailureKind(enum.IntEnum):
     MapTooLarge = 21
     DeliveryOffCorner = 22
     SideUnknown = 23
-    SideTooShort = 24
+    SideWrong = 24
     TooManyProducts = 25
     ProductOutside = 26
     ProductTwice = 27
@@ -198,12 +198,6 @@ class Pick(enum.IntEnum):
     Manual = 0
     Auto = 1
 
-class Side(enum.IntEnum):
-    Left = 0
-    Up = 1
-    Right = 2
-    Down = 3
-
 class BlockSource(enum.IntEnum):
     Sensor = 0
     Person = 1
@@ -213,7 +207,7 @@ class TextKind(enum.IntEnum):
     Began = 1
     Map = 2
 
-class ToldKind(enum.IntEnum):
+class NavigatorInputKind(enum.IntEnum):
     None_ = 0
     Tick = 1
     Line = 2
@@ -221,20 +215,31 @@ class ToldKind(enum.IntEnum):
     Steering = 4
     Map = 5
     Order = 6
-    Cancel = 7
-    MoveUp = 8
-    ClearQueue = 9
-    PickupDone = 10
-    Pick = 11
-    DrivenByHand = 12
-    Reset = 13
-    Placed = 14
-    Way = 15
-    Link = 16
-    Mode = 17
-    Renewed = 18
-    Repeated = 19
-    Goods = 20
+    Operator = 7
+    DrivenByHand = 8
+    Mode = 9
+    Renewed = 10
+    Repeated = 11
+
+class InputKind(enum.IntEnum):
+    PickupDone = 0
+    ResetPressed = 1
+    Placed = 2
+    PickupForced = 3
+    OrderCancelled = 4
+    OrderMovedUp = 5
+    QueueCleared = 6
+    LinkLost = 7
+    LinkBack = 8
+    SwitchedToManual = 9
+    SwitchedToAutonomous = 10
+    PickByHand = 11
+    PickByItself = 12
+    GoodsGone = 13
+    GoodsBack = 14
+    Horn = 15
+    WayBlocked = 16
+    WayOpened = 17
 
 class GoneWhy(enum.IntEnum):
     Delivered = 0
@@ -251,24 +256,6 @@ class EventKind(enum.IntEnum):
     PickupRefused = 5
     Failed = 6
     WayBlocked = 7
-
-class InputKind(enum.IntEnum):
-    PickupDone = 0
-    SwitchPressed = 1
-    ResetPressed = 2
-    Placed = 3
-    PickupForced = 4
-    OrderCancelled = 5
-    OrderMovedUp = 6
-    QueueCleared = 7
-    LinkLost = 8
-    LinkBack = 9
-    SwitchedToManual = 10
-    SwitchedToAutonomous = 11
-    PickByHand = 12
-    PickByItself = 13
-    GoodsGone = 14
-    GoodsBack = 15
 
 class ThoughtKind(enum.IntEnum):
     None_ = 0
@@ -333,6 +320,7 @@ class ThoughtKind(enum.IntEnum):
     GoodsBack = 59
     AllGoodsBack = 60
     GoodsGone = 61
+    Honks = 62
 
 class Joint(enum.IntEnum):
     Base = 0
@@ -434,7 +422,6 @@ class Health(Layout):
     orders_refused: int
     leases_expired: int
     refused_id: int
-    switch_ids: Sequence[int]
     next_lease_ms: int
     gain_p: int
     gain_d: int
@@ -550,23 +537,31 @@ class Sent(Layout):
     epoch: int
     next: int
 
-class Told(Layout):
+class NavigatorInput(Layout):
     time_ns: int
     number: int
-    product: int
     proof: int
     command_id: int
     kind: int
     value: int
     flag: int
-    x: int
-    y: int
-    heading: int
     code: int
     arm_granted: int
     reserved: Sequence[int]
 
-class ToldInputs(Layout):
+class Order(Layout):
+    id: int
+    product: int
+
+class Input(Layout):
+    kind: int
+    x: int
+    y: int
+    heading: int
+    order_id: int
+    id: int
+
+class NavigatorInputs(Layout):
     first: int
     commands: Sent
     statuses: Sent
@@ -576,14 +571,14 @@ class ToldInputs(Layout):
     text_kind: int
     entries_used: int
     reports_used: int
+    orders_used: int
+    operator_used: int
     reserved: Sequence[int]
-    entries: Sequence[Told]
+    entries: Sequence[NavigatorInput]
     reports: Sequence[SteeringReport]
+    orders: Sequence[Order]
+    operator: Sequence[Input]
     text: Sequence[Sequence[int]]
-
-class Order(Layout):
-    id: int
-    product: int
 
 class WaitingOrder(Layout):
     id: int
@@ -615,14 +610,6 @@ class Event(Layout):
     order_id: int
     product: int
     failure: Failure
-
-class Input(Layout):
-    kind: int
-    x: int
-    y: int
-    heading: int
-    order_id: int
-    id: int
 
 class Thought(Layout):
     kind: int
@@ -710,7 +697,7 @@ class ByName:
     @overload
     def topic(self, name: Literal["nav/blocks"]) -> Reader[BlockedWays]: ...
     @overload
-    def topic(self, name: Literal["nav/inputs"]) -> Reader[ToldInputs]: ...
+    def topic(self, name: Literal["nav/inputs"]) -> Reader[NavigatorInputs]: ...
     @overload
     def topic(self, name: Literal["mission/order"]) -> Reader[Order]: ...
     @overload

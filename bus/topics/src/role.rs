@@ -1,12 +1,12 @@
-//! Who a process is on the bus.
+//! [`Role`]: the part that a process plays on the robot's bus.
 
 use core::fmt;
 use core::str::FromStr;
 
-use crate::tag::coded;
+use lager_sample::{Part, coded};
 
 coded! {
-    /// The part a process plays; it is in its node's name and decides what it may wait on.
+    /// The part that a process plays. It is in its node's name and decides what wakes it.
     pub enum Role {
         /// Serial ports and the arbiter.
         Bridge = 0,
@@ -28,9 +28,9 @@ coded! {
         Supervisor = 8,
         /// One-shot commands such as `lager drive`.
         Operator = 9,
-        /// Any tool that only looks.
+        /// Any tool that only observes.
         Observer = 10,
-        /// A program of somebody else that acts on topics.
+        /// Another program, not of this project, that acts on topics.
         Guest = 11,
     }
 }
@@ -70,8 +70,8 @@ impl Role {
         }
     }
 
-    /// What a person calls who has stopped the robot, or changed its mode, in this role: the
-    /// program that he knows.
+    /// The name that people know for a process with this role, when that process has stopped the
+    /// robot or changed its mode.
     pub const fn as_author(self) -> &'static str {
         match self {
             Self::Comm | Self::Station => "the external computer or its panel",
@@ -87,14 +87,28 @@ impl Role {
         }
     }
 
-    /// Whether the process only looks. Observers share the 64 places a topic has for them;
-    /// all other roles have places of their own, so that looking can never keep the robot
-    /// from working.
+    /// Whether the process only observes.
     pub const fn is_observer(self) -> bool {
         matches!(
             self,
             Self::Recorder | Self::Monitor | Self::Gateway | Self::Observer
         )
+    }
+
+    /// The role as a part on the bus.
+    pub const fn part(self) -> Part {
+        let part = Part::new(self as u8, self.as_str());
+        if self.is_observer() {
+            part.observing()
+        } else {
+            part
+        }
+    }
+}
+
+impl From<Role> for Part {
+    fn from(role: Role) -> Self {
+        role.part()
     }
 }
 
@@ -104,7 +118,19 @@ impl fmt::Display for Role {
     }
 }
 
-/// A text that is no role.
+/// The name that people use for a process whose part or subcommand is `who`.
+#[must_use]
+pub fn called(who: &str) -> &str {
+    match who {
+        "comm" => "link to the station (comm)",
+        "simulator" => "simulated robot (simulator)",
+        "emulator" => "emulated boards (emulator)",
+        "up" => "supervisor (up)",
+        other => other,
+    }
+}
+
+/// The text names no role.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownRole(pub String);
 
@@ -134,7 +160,7 @@ impl FromStr for Role {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tag::Coded;
+    use lager_sample::Coded;
 
     #[test]
     fn every_role_is_found_by_its_name_and_by_its_code() {

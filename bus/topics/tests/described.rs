@@ -1,20 +1,18 @@
-//! Every topic as a tool sees it that was built without it.
+//! Reads every topic as a tool sees it that was not built with the topic.
 
-use lager_topics::{
-    Coded, Description, Field, Role, TOPICS, Tag, Topic, TopicVisitor, bytes_of, coded, describe,
-    payload, visit,
-};
+use lager_sample::{Coded, Description, Field, Tag, Topic, bytes_of, coded, describe, payload};
+use lager_topics::{Role, TOPICS, TopicVisitor, visit};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
 coded! {
-    /// What is above.
+    /// The clouds in the sky.
     pub enum Sky {
         /// Nothing.
         Clear = 0,
-        /// Much.
+        /// Many.
         Fog = 7,
-        /// The most there is.
+        /// As many as possible.
         Storm = 8,
     }
 }
@@ -24,7 +22,7 @@ payload! {
     pub struct Gust: 4 bytes {
         /// In mm/s.
         pub mm_s: i16,
-        /// What was above.
+        /// The clouds at that time.
         pub sky: Tag<Sky>,
         /// Fills the gap.
         pub reserved: u8,
@@ -38,7 +36,7 @@ payload! {
         pub wind: f64,
         /// Three gusts.
         pub gusts: [Gust; 3],
-        /// What is above.
+        /// The clouds now.
         pub sky: Tag<Sky>,
         /// Fills the gap.
         pub reserved: [u8; 3],
@@ -85,7 +83,7 @@ fn a_sample_reads_as_its_type_would_write_it() {
     assert!(description.read(&bytes_of(&weather)[1..]).is_none());
 }
 
-/// What a topic's own type says of a blank sample, beside what its description says.
+/// A blank sample as the topic's own type shows it, and as the topic's description shows it.
 struct Both;
 
 impl TopicVisitor for Both {
@@ -103,7 +101,7 @@ impl TopicVisitor for Both {
     }
 }
 
-/// Whether `full` says all that `short` says; lists may be longer.
+/// Whether `full` contains everything in `short`; lists may be longer.
 fn says(full: &Value, short: &Value) -> bool {
     match (full, short) {
         (Value::Object(full), Value::Object(short)) => {
@@ -127,7 +125,7 @@ fn every_topic_of_the_table_is_described_as_it_is() {
     }
 }
 
-/// What of `value` does not fit `schema`, as far as this crate writes schemas.
+/// The part of `value` that does not fit `schema`, for the schemas that this crate writes.
 fn misfit(schema: &Value, value: &Value) -> Option<String> {
     let is_of_type = match schema["type"].as_str().expect("a type") {
         "object" => {
@@ -209,7 +207,7 @@ fn a_schema_says_what_may_stand_where() {
     }
 }
 
-/// The bytes of a description that one service carries: seven of its eight attributes.
+/// The bytes of a description that fit into one service: seven of its eight attributes.
 const ROOM: usize = 7 * 256;
 
 #[test]
@@ -271,7 +269,7 @@ proptest! {
     }
 }
 
-/// A blank `Weather`, filled with what `text` says.
+/// A blank `Weather`, filled from `text`.
 fn filled(text: &str) -> Result<Vec<u8>, String> {
     let mut filled = bytes_of(&Weather::default()).to_vec();
     let mut json = serde_json::Deserializer::from_str(text);
@@ -357,7 +355,7 @@ fn a_path_leads_to_a_field_or_says_what_there_is() {
     }
 }
 
-/// Any bytes of a topic's payload, shown and made again.
+/// Shows random bytes of a topic's payload and makes them again.
 struct ThereAndBack(u64);
 
 impl TopicVisitor for ThereAndBack {

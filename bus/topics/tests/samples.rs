@@ -1,9 +1,11 @@
-//! Payloads as tools see them: JSON, and memory written by somebody else.
+//! Payloads as tools see them: as JSON, and in memory that another program has written.
 
+use lager_floor::Heading;
+use lager_sample::{Coded, Tag, Topic};
 use lager_topics::{
-    BoardHealth, Coded, DistanceFrame, FailureKind, Finish, Health, Hold, LineFrame, MapProduct,
-    Remedy, Role, Route, RouteNode, SERVO_UNKNOWN, Side, SteeringReport, TOPICS, Tag, Thought,
-    ThoughtKind, Topic, TopicVisitor, Truth, WarehouseMap, visit,
+    BoardHealth, DistanceFrame, FailureKind, Finish, Health, Hold, LineFrame, MapProduct, Remedy,
+    Role, Route, RouteNode, SERVO_UNKNOWN, SteeringReport, TOPICS, Thought, ThoughtKind,
+    TopicVisitor, Truth, WarehouseMap, visit,
 };
 use lager_wire::LineState;
 use serde::Serialize;
@@ -58,7 +60,7 @@ fn a_list_shows_its_used_part_and_comes_back_whole() {
         id: -7,
         x: 1,
         y: 2,
-        side: Side::Down.into(),
+        side: Heading::Down.into(),
         reserved: 0,
     };
     let shown = json(&map);

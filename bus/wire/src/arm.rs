@@ -1,20 +1,18 @@
-//! The arm's profile: what a robot's arm may do and where its poses are (AMB-32), and how it
-//! travels.
+//! [`ArmProfile`]: what a robot's arm may do and where its poses are (AMB-32), and how it travels.
 //!
 //! ```text
 //!  Pi                                              steering board
-//!   | -- setting ArmTorqueLimit, value -----------> |  put aside, answered
+//!   | -- setting ArmTorqueLimit, value -----------> |  the board stores it and answers
 //!   |    ... one setting for each value ...         |
-//!   | -- setting ArmProfile, check value ---------> |  all of it in force, or none
+//!   | -- setting ArmProfile, check value ---------> |  all values are in force, or none
 //!   | <------- reply, check value in force -------- |
 //! ```
 //!
-//! A board obeys a profile as a whole, because half of a new one beside half of the old one may
-//! allow what neither of them does. The carry pose stays on the Pi, where the code that turns the
-//! wheels needs it.
+//! A board obeys a profile as a whole, because half of a new profile beside half of the old one may
+//! allow what neither of them allows. The carry pose stays on the Pi, because the code that turns
+//! the wheels needs it there.
 //!
-//! The type stands here because configuration, bridge, board and simulator must agree on it and on
-//! the rules that it has to keep.
+//! The type stands here because configuration, bridge, board and simulator must agree on it.
 
 mod rules;
 
@@ -27,7 +25,7 @@ use rules::broken;
 /// The greatest position, load and torque of a servo.
 pub const SERVO_MAX: u16 = 1023;
 
-/// Where a joint may be sent, in positions 0 to 1023 of its (first) servo.
+/// The positions to which a joint may go: 0 to 1023 of its (first) servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(from = "[u16; 2]", into = "[u16; 2]"))]
@@ -105,8 +103,8 @@ pub struct ArmPose {
     pub wrist: u16,
 }
 
-/// What a robot's arm may do. [`Default`] is the robot of the simulator's world, and what a board
-/// obeys that has been told nothing.
+/// What a robot's arm may do. [`Default`] is the robot of the simulator's world, and the profile of
+/// a board that has received none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
@@ -119,11 +117,11 @@ pub struct ArmProfile {
     pub gripper_open: u16,
     /// Gripper position when closed on nothing.
     pub gripper_closed: u16,
-    /// Where each joint may be sent.
+    /// The positions to which each joint may go.
     pub limits: JointLimits,
-    /// Where the arm goes when it has let go.
+    /// Where the arm goes after it has let go.
     pub neutral: ArmPose,
-    /// Where goods are let go.
+    /// Where the arm lets goods go.
     pub drop: ArmPose,
     /// Where the arm is while the robot drives with goods.
     pub carry: ArmPose,
@@ -156,15 +154,15 @@ impl Default for ArmProfile {
 }
 
 impl ArmProfile {
-    /// How many values a board is told: all but the carry pose.
+    /// How many values a board receives: all but the carry pose.
     pub const VALUES: usize = 24;
 
-    /// Whether an arm can obey it.
+    /// Checks that an arm can obey this profile.
     ///
     /// # Errors
-    /// The first rule it breaks.
+    /// The first rule that the profile breaks.
     pub fn validate(&self) -> Result<(), ArmProfileError> {
-        // The carry pose keeps the rules of a pose that a board is told.
+        // The carry pose must keep the rules of a pose that a board receives.
         let carried = Self {
             drop: self.carry,
             ..*self
@@ -178,12 +176,12 @@ impl ArmProfile {
         Ok(())
     }
 
-    /// The same for values that have been told. It costs a board less than the reason would.
+    /// The same check for the values that a board has received. It takes less room than the reason.
     pub fn is_sound(values: &[u16; Self::VALUES]) -> bool {
         broken(values).is_none()
     }
 
-    /// What a board is told, in the order of [`ArmProfile::key`].
+    /// The values that a board receives, in the order of [`ArmProfile::key`].
     pub const fn values(&self) -> [u16; Self::VALUES] {
         let limits = &self.limits;
         [
@@ -214,7 +212,7 @@ impl ArmProfile {
         ]
     }
 
-    /// The profile that has these values. A board knows no carry pose; it takes the neutral one.
+    /// The profile with these values. A board has no carry pose; this takes the neutral one.
     pub const fn from_values(values: &[u16; Self::VALUES]) -> Self {
         let neutral = pose(values, 16);
         Self {
@@ -236,13 +234,13 @@ impl ArmProfile {
         }
     }
 
-    /// The setting that tells value `index` of [`ArmProfile::values`].
+    /// The setting that carries value `index` of [`ArmProfile::values`].
     pub fn key(index: usize) -> Option<SettingKey> {
         let code = u8::try_from(index).ok()?.checked_add(FIRST)?;
         SettingKey::from_code(code).filter(|key| Self::index(*key).is_some())
     }
 
-    /// The place in [`ArmProfile::values`] of what a setting tells, if it is one of them.
+    /// The index in [`ArmProfile::values`] of the value that a setting carries, if it carries one.
     pub const fn index(key: SettingKey) -> Option<usize> {
         let code = key.code();
         if code >= FIRST && code <= LAST {

@@ -1,4 +1,4 @@
-//! How the arm's servos and a board itself are doing. Version 1 only.
+//! Reports of the arm's servos and of a board's own state. Version 1 only.
 //!
 //! ```text
 //! arm data       servo  errors  position low  high  load low  high  decivolts  celsius
@@ -11,7 +11,7 @@ use crate::handshake::ResetCause;
 /// One servo of the arm, as it last answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ArmData {
-    /// The AX-12's id, 1 to 8. Another id is refused by the receiver.
+    /// The AX-12's id, 1 to 8. The receiver refuses other ids.
     pub servo: u8,
     /// The AX-12's error bits; bit 7 is not one of them and is dropped.
     pub errors: u8,
@@ -75,14 +75,14 @@ impl ArmData {
     }
 }
 
-/// How a board is. The counters run from the board's start and stay at 255.
+/// The state of a board. The counters run from the board's start and stay at 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BoardStatus {
     /// Why the board started.
     pub reset: ResetCause,
-    /// Packets from the Pi that came damaged.
+    /// Damaged packets from the Pi.
     pub bad_packets: u8,
-    /// Packets from the Pi that never came, a lower bound.
+    /// Packets from the Pi that never came; there may be more.
     pub lost_packets: u8,
     /// Commands that were refused.
     pub refused: u8,

@@ -1,6 +1,6 @@
-//! A payload's bytes, and what can be wrong with them.
+//! The bytes of a payload, and the errors that they can contain.
 //!
-//! Apart from the payloads, which all read and write them.
+//! They are apart from the payloads because all payloads use them.
 
 /// How many payload bytes a full packet has (U7).
 pub const PAYLOAD_LENGTH: usize = 8;

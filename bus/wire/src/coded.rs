@@ -1,6 +1,6 @@
-//! The one way an enum gets its byte: an explicit code per variant, read back by a match.
+//! The macro `coded`: gives each variant of an enum an explicit byte, and reads it back by a match.
 //!
-//! It is apart so that no packet rests on the order of an enum and nothing is ever transmuted.
+//! It is apart so that no packet depends on an enum's order and nothing is ever transmuted.
 
 /// Defines an enum whose variants have fixed one-byte codes.
 macro_rules! coded {
@@ -30,7 +30,7 @@ macro_rules! coded {
                 }
             }
 
-            /// The byte that stands for this variant on the wire.
+            /// The byte of this variant on the wire.
             pub const fn code(self) -> u8 {
                 match self {
                     $( Self::$variant => $code, )*

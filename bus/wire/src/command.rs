@@ -1,12 +1,12 @@
-//! The steering board's own commands, by the codes of its header file (K, styrenhet.h).
+//! [`Command`]: the steering board's own commands, by the codes of its header (K, styrenhet.h).
 //!
-//! They are apart from the operator's commands because the same byte means different things on
-//! the two lists: 7 is "right" to an operator and a quarter turn left to the board (AMB-2).
+//! They are apart from the operator's commands because the same byte means different things in the
+//! two lists: 7 is "right" to an operator and a quarter turn left to the board (AMB-2).
 
 use crate::coded::coded;
 
 coded! {
-    /// What the wheels do; the high nibble of the code is 0 (T3).
+    /// A command to the wheels; the high nibble of its code is 0 (T3).
     pub enum WheelCommand {
         /// Stand still. The arm may move only in this state (T4).
         Standby = 1,
@@ -18,15 +18,15 @@ coded! {
         ManualBackward = 4,
         /// Follow the line backward.
         ActiveBackward = 5,
-        /// Turn left until told otherwise.
+        /// Turn left until another command comes.
         ManualLeft = 6,
-        /// A quarter turn left, once. Only the logic unit may ask for it.
+        /// A quarter turn left, once. Only the logic unit may command it.
         LeftPerp = 7,
         /// 45 degrees left, once.
         LeftDiag = 8,
-        /// Turn right until told otherwise.
+        /// Turn right until another command comes.
         ManualRight = 9,
-        /// A quarter turn right, once. Only the logic unit may ask for it.
+        /// A quarter turn right, once. Only the logic unit may command it.
         RightPerp = 10,
         /// 45 degrees right, once.
         RightDiag = 11,
@@ -34,7 +34,7 @@ coded! {
 }
 
 impl WheelCommand {
-    /// Whether it runs once and ends by itself, rather than being a setpoint that holds.
+    /// Whether it runs once and ends by itself. Otherwise it is a setpoint that holds.
     pub const fn is_one_shot(self) -> bool {
         matches!(
             self,
@@ -66,7 +66,7 @@ coded! {
         Squeeze = 0xF9,
         /// Open the gripper.
         Release = 0xFA,
-        /// The delivery sequence: lower, open, back up. Only the logic unit may ask for it
+        /// The delivery sequence: lower, open, back up. Only the logic unit may command it
         /// (AMB-27).
         Drop = 0xFB,
     }
@@ -82,7 +82,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// The command with this firmware code; `None` for the codes no list defines (AMB-52).
+    /// The command with this firmware code; `None` for codes that are in no list (AMB-52).
     pub const fn from_code(code: u8) -> Option<Self> {
         if let Some(wheel) = WheelCommand::from_code(code) {
             Some(Self::Wheel(wheel))
@@ -101,8 +101,8 @@ impl Command {
         }
     }
 
-    /// Whether it runs once and reports, rather than being a setpoint that holds. Timed turns and
-    /// all arm commands do.
+    /// Whether it runs once and reports its end, as timed turns and all arm commands do. Otherwise
+    /// it is a setpoint that holds.
     pub const fn is_one_shot(self) -> bool {
         match self {
             Self::Wheel(wheel) => wheel.is_one_shot(),

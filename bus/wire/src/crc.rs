@@ -1,14 +1,14 @@
 //! The check value of version 1: CRC-8/AUTOSAR (polynomial 0x2F), over a packet's first ten bytes
 //! and over settings kept in EEPROM.
 //!
-//! With 80 bits before it every error of one, two or three bits is found: a test tries all of them,
-//! 113 652 for each packet tried.
+//! Over 80 bits it finds every error of one, two or three bits: a test tries all of them, 113 652
+//! for each tested packet.
 
 use crc::{CRC_8_AUTOSAR, Crc, Table};
 
-// One table of 256 bytes everywhere: on the boards it lies in RAM (constants are copied there) and
-// takes 60 us off every packet, which is on the way from the tape to the wheels; on the Pi it is
-// ten times as fast as bit by bit (3 ns and 37 ns a packet where it was measured), and larger
+// One table of 256 bytes everywhere. On the boards it lies in RAM, because constants are copied
+// there, and takes 60 us off every packet, which is on the way from the tape to the wheels. On the
+// Pi it is ten times as fast as bit by bit (measured: 3 ns instead of 37 ns a packet). Larger
 // tables need longer input.
 static CRC: Crc<u8, Table<1>> = Crc::<u8, Table<1>>::new(&CRC_8_AUTOSAR);
 

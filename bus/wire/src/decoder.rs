@@ -1,24 +1,23 @@
-//! From bytes as they come to packets: one byte in, at most one packet out.
+//! [`Decoder`]: finds packets in a stream of bytes. One byte goes in, at most one packet comes out.
 //!
-//! Nothing marks a packet's start (AMB-9), so a start is believed by structure alone:
+//! Nothing marks a packet's start (AMB-9), so the decoder accepts a start by its structure alone:
 //!
 //! ```text
 //!              header plausible            11 bytes, CRC and content fit
 //!   version 1  ----------------> collect  ------------------------------> packet
-//!                   ^                | no: one byte further, look again at what is buffered
+//!                   ^                | no: move one byte on, look again at the buffered bytes
 //!                   +----------------+
 //!
-//!   original   as above by the length stated, no CRC; while hunting (at the start, after a skip,
-//!              after a gap in the ids) a packet is held until the next header is there, is
-//!              plausible and has the id that follows
+//!   original   the same with the length that the header states, without CRC. While hunting (at the
+//!              start, after a skip, after a gap in the ids) a packet is held until the next header
+//!              has come, is plausible and has the next id
 //! ```
 //!
-//! Because a failed window moves by only one byte, a complete version-1 packet behind noise is
-//! never lost. Time plays no part, because USB adapters deliver bytes in bursts; the boards' end of
-//! a link resets the decoder on a gap.
+//! A rejected window moves on by only one byte, so a complete version-1 packet after noise is never
+//! lost. Time does not matter here, because USB adapters deliver bytes in bursts. The boards' end
+//! of a link resets the decoder after a gap in time.
 //!
-//! Measured: 10 MB of random bytes yield 0 packets by the rules of version 1, and 61 by those of
-//! the original.
+//! Measured: 10 MB of random bytes yield 0 packets by version 1's rules, and 61 by the original's.
 
 use crate::handshake::Version;
 use crate::packet::{
@@ -26,23 +25,23 @@ use crate::packet::{
 };
 use crate::payload::Kind;
 
-/// The longest packet and the header behind it.
+/// Room for the longest packet and the header after it.
 const CAPACITY: usize = PACKET_LENGTH + HEADER_LENGTH;
 
-/// What a decoder has seen. All of it wraps.
+/// A decoder's counters. All of them wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecoderCounters {
-    /// Packets given out.
+    /// Packets returned.
     pub packets: u32,
-    /// Windows with a plausible header whose check value did not fit.
+    /// Windows with a plausible header but a wrong check value.
     pub bad_crc: u32,
-    /// Windows whose check value fits, or that have none, with a payload that breaks a rule.
+    /// Windows with a right check value, or without one, whose payload breaks a rule.
     pub bad_content: u32,
     /// Bytes that belong to no packet.
     pub skipped_bytes: u32,
 }
 
-/// The id and kind of the packet before, while the stream has been whole since.
+/// The id and kind of the packet before, as long as no byte was skipped since.
 #[derive(Clone, Copy, Debug)]
 struct Header {
     id: PacketId,
@@ -58,8 +57,8 @@ impl Header {
         })
     }
 
-    /// Whether `next` can stand right behind this header. Original boards may repeat a SYN with
-    /// the id unchanged, and may start counting at 0 after it.
+    /// Whether `next` can follow this header directly. Original boards may repeat a SYN with the
+    /// same id, and may start counting at 0 after it.
     fn is_followed_by(self, next: Self) -> bool {
         next.id == self.id.next()
             || self.kind == Kind::Handshake
@@ -74,9 +73,9 @@ pub struct Decoder {
     length: u8,
     buffer: [u8; CAPACITY],
     counters: DecoderCounters,
-    /// Original only: the last packet given out, `None` while hunting.
+    /// Original only: the last packet returned; `None` while hunting.
     locked: Option<Header>,
-    /// Original only: the bytes of the last handshake given out.
+    /// Original only: the bytes of the last handshake returned.
     handshake: [u8; PACKET_LENGTH],
 }
 
@@ -98,7 +97,7 @@ impl Decoder {
         }
     }
 
-    /// Takes the next byte and gives the packet that it completes, if any.
+    /// Takes the next byte and returns the packet that it completes, if any.
     #[inline]
     pub fn push(&mut self, byte: u8) -> Option<Packet> {
         match self.version {
@@ -110,8 +109,8 @@ impl Decoder {
         }
     }
 
-    /// The same on a board, which hears only the Pi, in version 1. So the original's rules, and how
-    /// packets of boards are read, take no room there.
+    /// The same on a board, which hears only the Pi, in version 1. So the original's rules, and the
+    /// reading of boards' packets, take no room there.
     #[inline]
     pub(crate) fn push_on_board(&mut self, byte: u8) -> Option<Packet> {
         self.push_one::<false>(byte)
@@ -148,25 +147,25 @@ impl Decoder {
         self.length > 0
     }
 
-    /// What the decoder has seen.
+    /// The decoder's counters.
     pub const fn counters(&self) -> &DecoderCounters {
         &self.counters
     }
 
-    /// The bytes of the last original handshake given out, zeros behind a short one.
+    /// The bytes of the last original handshake returned, with zeros after a short one.
     pub(crate) const fn last_handshake(&self) -> &[u8; PACKET_LENGTH] {
         &self.handshake
     }
 
-    /// Version 1: keeps the invariant that what is buffered starts like a packet.
+    /// Version 1: keeps the invariant that the buffered bytes start like a packet.
     fn check_header(&mut self) {
         if !self.starts_like_a_packet(0) {
             self.skip_to_next_start();
         }
     }
 
-    /// Version 1: the window is full. It is no generic function, so this crate compiles it once: as
-    /// one of each crate that decodes it took a quarter more instructions.
+    /// Version 1: the window is full. It is not generic, so only this crate compiles it: compiled
+    /// in each crate that decodes, it took a quarter more instructions.
     fn examine_any_window(&mut self) -> Option<Packet> {
         self.examine_window::<true>()
     }
@@ -200,11 +199,11 @@ impl Decoder {
         self.skip(next.unwrap_or(self.length));
     }
 
-    /// Original: gives out the packet at the front once it is believed, else moves on.
+    /// Original: returns the packet at the front once it is confirmed, else moves on.
     ///
-    /// At most one packet leaves per byte, so what a failed window uncovers may wait for the next
-    /// bytes. The buffer cannot overflow: unless a packet leaves, fewer bytes are kept than the
-    /// longest packet and a header need.
+    /// At most one packet leaves per byte, so a packet behind a rejected window may wait for the
+    /// next bytes. The buffer cannot overflow: unless a packet leaves, it keeps fewer bytes than
+    /// the longest packet and a header need.
     fn examine_original(&mut self) -> Option<Packet> {
         loop {
             let bytes = &self.buffer[..usize::from(self.length)];

@@ -1,20 +1,20 @@
-//! The handshake: who speaks, by which version of the rules, and why it started (U11, U12, U14).
+//! [`Handshake`]: who speaks, by which version of the rules, and why it started (U11, U12, U14).
 //!
 //! ```text
 //! payload byte 0   bits 0-1 synack, bits 2-7 callsign      the original's one byte (U12)
 //! payload byte 1   version of the packet rules             version 1 only
 //! payload byte 2   why the board started                   version 1 only
-//! payload byte 3   1: it has been up since it started      version 1 only
+//! payload byte 3   1: the link has been up since start     version 1 only
 //! payload 4 to 7   0
 //! ```
 //!
-//! It only reads and writes bytes. The link machines decide what a handshake means.
+//! This file only reads and writes bytes. The link machines decide what a handshake means.
 
 use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;
 
 coded! {
-    /// The rules a packet is built by.
+    /// The rules by which a packet is built.
     pub enum Version {
         /// The original boards: no check value, the end byte means nothing.
         Original = 0,
@@ -40,7 +40,7 @@ coded! {
 coded! {
     /// Question or answer (U11; these are not the ASCII control codes).
     pub enum SynAck {
-        /// A request to be answered.
+        /// A request for an answer.
         Syn = 0,
         /// The answer.
         Ack = 1,
@@ -50,7 +50,7 @@ coded! {
 coded! {
     /// Why a board started.
     pub enum ResetCause {
-        /// Not known, or the peer cannot say.
+        /// Not known, or the other end cannot say.
         Unknown = 0,
         /// Power was switched on.
         PowerOn = 1,
@@ -67,21 +67,32 @@ coded! {
     }
 }
 
-/// A handshake packet's content.
+#[cfg(feature = "lager-sample")]
+lager_sample::coded_as_is!(ResetCause {
+    Unknown,
+    PowerOn,
+    External,
+    BrownOut,
+    Watchdog,
+    Panic,
+    Jtag,
+});
+
+/// The content of a handshake packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Handshake {
     /// Question or answer.
     pub kind: SynAck,
     /// The sender.
     pub sign: Callsign,
-    /// The rules the packet was built by. Encoding writes the version it encodes for, whatever
-    /// stands here, so that a packet never claims other rules than its own.
+    /// The rules by which the packet was built. Encoding ignores this value and writes the version
+    /// that it encodes for, so that a packet never claims other rules than its own.
     pub version: Version,
     /// Why the sender started; always `Unknown` from an original board.
     pub reset: ResetCause,
-    /// Whether the link has been up since the sender started. A board that asks again and says no
-    /// has started anew, however long it was silent before. Always `false` from the Pi and from an
-    /// original board.
+    /// Whether the link has been up since the sender started. If a board asks again and this is
+    /// false, the board has restarted, however long it was silent before. Always `false` from the
+    /// Pi and from an original board.
     pub was_up: bool,
 }
 

@@ -1,13 +1,13 @@
 //! The UART packets between the two boards and the Raspberry Pi.
 //!
-//! The same code runs on the boards, in the simulator and in the bridge, so the two ends of a
-//! line cannot disagree about a byte. Layout and codes are the original robot's (technical
-//! documentation, appendix B.1); version 1 adds a check value, a reset cause and five kinds.
+//! The same code runs on the boards, in the simulator and in the bridge, so the two ends of a line
+//! cannot disagree about a byte. Layout and codes are the original robot's (technical
+//! documentation, appendix B.1). Version 1 adds a check value, a reset cause and five kinds.
 //!
-//! - [`Packet`]: eleven bytes and back.
-//! - [`Decoder`]: bytes as they come, packets out, resynchronised by structure alone.
+//! - [`Packet`]: a packet as eleven bytes and back.
+//! - [`Decoder`]: finds packets in a stream of bytes, also after noise, by their structure alone.
 //! - [`link`]: both ends of the handshake, as state machines.
-//! - [`OperatorCommand::firmware`]: the one table from an operator's codes to the board's.
+//! - [`OperatorCommand::firmware`]: the only table from an operator's codes to the board's.
 //!
 //! It never allocates, never panics on input, never reads a clock and does no input or output.
 
@@ -43,5 +43,5 @@ pub use operator::{OperatorArm, OperatorCommand};
 pub use packet::{DecodeError, END, MIN_LENGTH, PACKET_LENGTH, Packet, PacketId};
 pub use payload::{Kind, Payload};
 pub use setting::{Setting, SettingKey, SettingReply, SettingStatus};
-pub use steer::{SteerCommand, SteerData, SteerFlags};
+pub use steer::{COMMAND_AGE, SteerCommand, SteerData, SteerFlags};
 pub use text::{Binary, CodeTextError, parse_code};

@@ -1,5 +1,5 @@
-//! What the sensor board tells the Pi: line state, raw line bits, what each line sensor reads while
-//! it is calibrated, distance (U5, U13, AMB-11, AMB-13).
+//! The sensor board's messages to the Pi: line state, raw line bits, the reading of each line
+//! sensor during a calibration, and the distance (U5, U13, AMB-11, AMB-13).
 //!
 //! ```text
 //! line reading   sensor  reading  lowest  highest  tells apart  0 0 0     version 1 only
@@ -12,7 +12,7 @@ use crate::coded::coded;
 use crate::handshake::Version;
 
 coded! {
-    /// The robot's position on the line (U13), as the robot stands: `LeftOfLine` means that the
+    /// The robot's position on the line (U13), seen from the robot: `LeftOfLine` means that the
     /// robot is to the left of the tape (AMB-19).
     pub enum LineState {
         /// The tape is under the middle of the sensor.
@@ -34,6 +34,18 @@ coded! {
     }
 }
 
+#[cfg(feature = "lager-sample")]
+lager_sample::coded_as_is!(LineState {
+    OnLine,
+    NotOnLine,
+    LeftOfLine,
+    RightOfLine,
+    StationToLeft,
+    StationToRight,
+    FourWay,
+    DropStation,
+});
+
 impl LineState {
     pub(crate) fn write(self, payload: &mut Bytes) {
         payload[0] = self.code();
@@ -53,18 +65,17 @@ impl LineState {
 pub struct LineBits(pub u16);
 
 impl LineBits {
-    /// How many sensors sit side by side (S5).
+    /// The number of sensors in the row (S5).
     pub const SENSORS: u8 = 11;
-    /// The bits that are sensors.
+    /// The bits of the sensors.
     pub const MASK: u16 = (1 << Self::SENSORS) - 1;
 
-    /// A reading from the low eleven bits; the bits above are dropped.
+    /// A reading from the low eleven bits; the higher bits are dropped.
     pub const fn new(bits: u16) -> Self {
         Self(bits & Self::MASK)
     }
 
-    /// Whether sensor `index` sees tape: 0 is the leftmost, 10 the rightmost, and what is beyond
-    /// them sees none.
+    /// Whether sensor `index` sees tape: 0 is the leftmost, 10 the rightmost. Others see none.
     pub const fn sensor(self, index: u8) -> bool {
         index < Self::SENSORS && self.0 & (1 << (Self::SENSORS - 1 - index)) != 0
     }
@@ -88,17 +99,17 @@ impl LineBits {
     }
 }
 
-/// What one line sensor has read in the calibration that runs, in steps of the converter, 0 to 255;
+/// The readings of one line sensor in the present calibration, in steps of the converter, 0 to 255;
 /// tape reads higher than floor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct LineReading {
-    /// Which: 0 is the leftmost, 10 the rightmost. Another one is refused by the receiver.
+    /// The sensor: 0 is the leftmost, 10 the rightmost. The receiver refuses other numbers.
     pub sensor: u8,
-    /// What it reads now.
+    /// The present reading.
     pub reading: u8,
-    /// The least that it has read, at most `reading`.
+    /// The lowest reading, at most `reading`.
     pub lowest: u8,
-    /// The most that it has read, at least `reading`.
+    /// The highest reading, at least `reading`.
     pub highest: u8,
     /// Whether the two lie so far apart that the board takes them for floor and tape.
     pub tells_apart: bool,

@@ -1,11 +1,12 @@
-//! The operator's commands, and the one table that turns them into the board's (AMB-1, AMB-2).
+//! [`OperatorCommand`]: the operator's commands, and the only table that turns them into the
+//! board's (AMB-1, AMB-2).
 //!
 //! They are apart because both lists use the codes 1 to 11 for different things. Every command from
-//! a person passes this table; quarter turns and the delivery drop are not in it.
+//! a person goes through this table. Quarter turns and the delivery drop are not in it.
 
 use crate::command::{ArmCommand, Command, WheelCommand};
 
-/// An arm command that an operator may give: every one but the delivery drop (AMB-27).
+/// An arm command that an operator may give: each one but the delivery drop (AMB-27).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct OperatorArm(ArmCommand);
 
@@ -108,8 +109,8 @@ impl OperatorCommand {
         }
     }
 
-    /// The board's command for it. This is the only place where operator codes become firmware
-    /// codes: 7 becomes 9, 9 becomes 11, and nothing becomes 7 or 10.
+    /// The board's command for it. Only here do operator codes become firmware codes: 7 becomes 9,
+    /// 9 becomes 11, and nothing becomes 7 or 10.
     pub const fn firmware(self) -> Command {
         match self {
             Self::Stop => Command::Wheel(WheelCommand::Standby),
@@ -125,8 +126,8 @@ impl OperatorCommand {
         }
     }
 
-    /// The name to write on a command line. Wheel names and arm names are two lists: `left`,
-    /// `right` stand on both, so the caller says which one it reads.
+    /// The name on a command line. Wheel names and arm names are two lists. `left` and `right` are
+    /// in both, so the caller must choose the list.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Stop => "stop",
@@ -154,7 +155,7 @@ impl OperatorCommand {
         }
     }
 
-    /// The key of the operator's panel, where it has one (K).
+    /// The key on the operator's panel, if there is one (K).
     pub const fn key(self) -> Option<&'static str> {
         Some(match self {
             Self::Stop | Self::FollowForward | Self::FollowBackward => return None,

@@ -1,13 +1,13 @@
-//! A packet as eleven bytes and back (U1-U9).
+//! [`Packet`]: a packet as eleven bytes and back (U1-U9).
 //!
 //! ```text
 //! byte   0                 1        2 .. 9     10
 //!        id | kind << 4    length   payload    end
 //! ```
 //!
-//! Length counts header, payload and end. In version 1 it is always 11 and the end is CRC-8 over
-//! the ten bytes before it. An original peer may send 4 to 11 bytes and its end is never looked
-//! at (U9). Finding where a packet starts is the decoder's business.
+//! Length counts header, payload and end. In version 1 it is always 11, and the end is CRC-8 over
+//! the ten bytes before it. An original peer may send 4 to 11 bytes, and nobody checks its end byte
+//! (U9). The decoder finds where a packet starts.
 
 use core::fmt;
 
@@ -32,7 +32,7 @@ pub(crate) const LENGTH_BYTE: u8 = 11;
 pub struct PacketId(u8);
 
 impl PacketId {
-    /// The number before the first: what was "received last" when a count starts.
+    /// The number before the first: the "last received" number when a count starts.
     pub(crate) const BEFORE_FIRST: Self = Self(15);
 
     /// The low four bits of `number`.
@@ -40,19 +40,18 @@ impl PacketId {
         Self(number & 0x0F)
     }
 
-    /// The number that follows.
+    /// The next number.
     #[must_use]
     pub const fn next(self) -> Self {
         Self::new(self.0 + 1)
     }
 
-    /// 0 to 15.
+    /// The number, 0 to 15.
     pub const fn get(self) -> u8 {
         self.0
     }
 
-    /// How many packets were lost between `last` and this one, at least: sixteen more may have
-    /// been lost unseen.
+    /// How many packets were lost between `last` and this one, at least; 16 more may be unseen.
     pub const fn missing_since(self, last: Self) -> u8 {
         self.0.wrapping_sub(last.0).wrapping_sub(1) & 0x0F
     }
@@ -89,17 +88,17 @@ pub enum DecodeError {
     },
     /// The check value does not fit.
     Crc {
-        /// What the bytes give.
+        /// The check value of the bytes.
         computed: u8,
-        /// What the packet says.
+        /// The check value in the packet.
         found: u8,
     },
-    /// A payload byte breaks a rule of its kind: a value out of range, a wrong complement, or an
-    /// unused byte that is not 0.
+    /// A payload byte breaks a rule of its kind: its value is out of range, its complement is
+    /// wrong, or it is unused and not 0.
     Payload {
         /// The packet's kind.
         kind: Kind,
-        /// Which payload byte, from 0.
+        /// The index of the payload byte, from 0.
         index: u8,
         /// Its value.
         found: u8,
@@ -131,9 +130,9 @@ impl fmt::Display for DecodeError {
 impl core::error::Error for DecodeError {}
 
 impl Packet {
-    /// The packet's bytes: always full length, which every original peer expects (AMB-6).
+    /// The packet's bytes, always at full length, as every original peer expects (AMB-6).
     ///
-    /// Kinds above 5 do not exist in the original; encoded for it they are bytes that it refuses.
+    /// The original has no kinds above 5, and refuses the bytes of such a packet.
     pub fn encode(&self, version: Version) -> [u8; PACKET_LENGTH] {
         let mut payload = [0; PAYLOAD_LENGTH];
         self.payload.write(version, &mut payload);
@@ -148,16 +147,16 @@ impl Packet {
         bytes
     }
 
-    /// The packet that `bytes` are, all of them and no more.
+    /// Decodes `bytes`, which must be one packet and no more.
     ///
     /// # Errors
     ///
-    /// When they are not a packet of this version; the error says which rule is broken.
+    /// The bytes are not a packet of this version; the error says which rule they break.
     pub fn decode(bytes: &[u8], version: Version) -> Result<Self, DecodeError> {
         Self::decode_from::<true>(bytes, version)
     }
 
-    /// The same from boards and the Pi, or only from the Pi.
+    /// The same for packets from boards and the Pi, or only from the Pi.
     pub(crate) fn decode_from<const BOARDS: bool>(
         bytes: &[u8],
         version: Version,

@@ -1,7 +1,7 @@
-//! What a packet carries: one payload per kind, and the rules every payload keeps.
+//! [`Payload`]: the content of a packet, with one layout for each kind.
 //!
-//! The layouts stand beside their types; here is only the choice between them. Version 1 checks
-//! every byte it can (unused bytes, complements, ranges), the original checks what it must.
+//! The layouts stand beside their types; this file only chooses between them. Version 1 checks
+//! every byte it can (unused bytes, complements, ranges), the original checks only what it must.
 
 use crate::board::{ArmData, BoardStatus};
 use crate::bytes::{Bytes, Fault};
@@ -18,13 +18,13 @@ coded! {
         Handshake = 0,
         /// The robot's position on the line.
         LineData = 1,
-        /// What the IR sensor sees.
+        /// The distance that the IR sensor sees.
         Distance = 2,
-        /// The eleven line sensors as they are (AMB-11).
+        /// The raw bits of the eleven line sensors (AMB-11).
         RawLine = 3,
         /// A command to the steering board.
         SteerCommand = 4,
-        /// What the steering board does (AMB-12).
+        /// The steering board's report (AMB-12).
         SteerData = 5,
         /// A setting to a board.
         Setting = 6,
@@ -32,9 +32,9 @@ coded! {
         SettingReply = 7,
         /// One servo of the arm.
         ArmData = 8,
-        /// How a board is.
+        /// The state of a board.
         BoardStatus = 9,
-        /// One line sensor, while the line sensors are calibrated.
+        /// The readings of one line sensor during a calibration.
         LineReading = 10,
     }
 }
@@ -48,7 +48,7 @@ impl Kind {
         }
     }
 
-    /// The board that alone sends this kind, if one does.
+    /// The board that sends this kind, if only one board does.
     pub const fn comes_only_from(self) -> Option<Callsign> {
         match self {
             Self::LineData | Self::Distance | Self::RawLine | Self::LineReading => {
@@ -64,20 +64,20 @@ impl Kind {
     }
 }
 
-/// A packet's content.
+/// The content of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Payload {
     /// SYN or ACK.
     Handshake(Handshake),
     /// The robot's position on the line.
     Line(LineState),
-    /// What the IR sensor sees.
+    /// The distance that the IR sensor sees.
     Distance(Centimetres),
-    /// The eleven line sensors as they are.
+    /// The raw bits of the eleven line sensors.
     RawLine(LineBits),
     /// A command to the steering board.
     SteerCommand(SteerCommand),
-    /// What the steering board does.
+    /// The steering board's report.
     SteerData(SteerData),
     /// A setting to a board.
     Setting(Setting),
@@ -85,9 +85,9 @@ pub enum Payload {
     SettingReply(SettingReply),
     /// One servo of the arm.
     ArmData(ArmData),
-    /// How a board is.
+    /// The state of a board.
     BoardStatus(BoardStatus),
-    /// One line sensor, while the line sensors are calibrated.
+    /// The readings of one line sensor during a calibration.
     LineReading(LineReading),
 }
 
@@ -125,8 +125,8 @@ impl Payload {
         }
     }
 
-    /// `given` is how many of the bytes the packet really had. Without `BOARDS`, what only boards
-    /// send has a fault in its first byte.
+    /// `given` is how many of the bytes the packet really had. Without `BOARDS`, a kind that only
+    /// boards send is a fault in the first byte.
     pub(crate) fn read<const BOARDS: bool>(
         kind: Kind,
         version: Version,

@@ -1,4 +1,4 @@
-//! Settings of a board at run time, and its answers (E9, E10). Version 1 only.
+//! Settings that the Pi sends to a board at run time, and the replies (E9, E10). Version 1 only.
 //!
 //! ```text
 //! setting   key  seq  value low  value high  !key    !seq  0  0
@@ -11,7 +11,7 @@ use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;
 
 coded! {
-    /// What can be set.
+    /// The name of a setting.
     pub enum SettingKey {
         /// The line regulator's proportional gain, 0 to 255; 2 at start.
         GainP = 1,
@@ -21,8 +21,8 @@ coded! {
         RawLine = 3,
         /// Starts the line sensor's calibration.
         Calibrate = 4,
-        /// Puts the arm's profile that was told before in force; the value is its check value
-        /// ([`crate::ArmProfile::check`]).
+        /// Puts the arm's profile that was sent before in force. The value is the profile's check
+        /// value ([`crate::ArmProfile::check`]).
         ArmProfile = 15,
         /// Torque limit of the arm's servos, 1 to 1023.
         ArmTorqueLimit = 16,
@@ -76,7 +76,7 @@ coded! {
 }
 
 coded! {
-    /// What became of a setting.
+    /// The result of a setting.
     pub enum SettingStatus {
         /// It is in force.
         Accepted = 0,
@@ -90,11 +90,11 @@ coded! {
 /// A setting to a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Setting {
-    /// What is set.
+    /// The setting's name.
     pub key: SettingKey,
-    /// The setting's number, which the answer repeats.
+    /// The setting's number, which the reply repeats.
     pub seq: u8,
-    /// The value wanted.
+    /// The new value.
     pub value: i16,
 }
 
@@ -122,16 +122,16 @@ impl Setting {
     }
 }
 
-/// A board's answer to a setting.
+/// A board's reply to a setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SettingReply {
-    /// What was to be set.
+    /// The setting's name.
     pub key: SettingKey,
-    /// The number of the setting that is answered.
+    /// The number of the setting that this answers.
     pub seq: u8,
     /// The value now in force.
     pub value: i16,
-    /// What became of it.
+    /// The result.
     pub status: SettingStatus,
 }
 

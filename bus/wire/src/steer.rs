@@ -1,4 +1,4 @@
-//! Commands to the steering board and what it reports back (U7, AMB-4, AMB-12).
+//! Commands to the steering board, and its reports (U7, AMB-4, AMB-12).
 //!
 //! ```text
 //! steercomm   version 1   code  seq  !code  !seq  0  0  0  0
@@ -7,26 +7,31 @@
 //!             original    code  left right  flags error (drops)  servo battery
 //! ```
 //!
-//! The complements make sure that noise cannot move the robot even where a CRC fits by chance.
+//! With the complements, noise cannot move the robot even if a CRC is right by chance.
+
+use core::time::Duration;
 
 use crate::bytes::{Bytes, Fault, PAYLOAD_LENGTH, unused_from};
 use crate::command::Command;
 use crate::handshake::Version;
 use crate::text::binary_digits;
 
+/// How long a version-1 steering board obeys a command that the Pi does not repeat.
+pub const COMMAND_AGE: Duration = Duration::from_millis(150);
+
 /// A command to the steering board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SteerCommand {
-    /// The firmware code. It may be one that no list defines: the board refuses and counts it
-    /// (AMB-52), so it has to get there.
+    /// The firmware code. It may be one that is in no list: the board must get it to count it
+    /// (AMB-52).
     pub code: u8,
-    /// The command's number: the same renews a command's age, a new one executes. 0 to and from an
-    /// original board, which knows no numbers.
+    /// The command's number: the same number renews the command's age, a new number is a new
+    /// command. 0 to and from an original board, which has no numbers.
     pub seq: u8,
 }
 
 impl SteerCommand {
-    /// What the code means, if it means anything.
+    /// The command that the code means, if it means one.
     pub const fn command(self) -> Option<Command> {
         Command::from_code(self.code)
     }
@@ -67,12 +72,12 @@ impl SteerCommand {
     }
 }
 
-/// What holds for the steering board at this moment, one bit each.
+/// The steering board's present conditions, one bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SteerFlags(pub u8);
 
 impl SteerFlags {
-    /// Nothing holds.
+    /// No condition holds.
     pub const NONE: Self = Self(0);
     /// The left wheel pair runs backwards.
     pub const LEFT_REVERSE: Self = Self(1);
@@ -80,30 +85,32 @@ impl SteerFlags {
     pub const RIGHT_REVERSE: Self = Self(2);
     /// The arm lock is closed (T4).
     pub const ARM_LOCKED: Self = Self(4);
-    /// Line words arrive from the sensor board, and following was not given up for their want.
+    /// Line words arrive from the sensor board, and the board has not given up following for lack
+    /// of them.
     pub const EXDE_OK: Self = Self(8);
-    /// The board has stopped by itself: the command grew too old, or following has lost its line.
-    /// The latter ends that command (`ABORTED` under its number), and nothing but another command
-    /// turns the wheels again; without `EXDE_OK` it lost the words, with it the tape in them.
+    /// The board has stopped by itself: the command grew too old, or the board lost the line that
+    /// it followed. In the second case the command has ended (`ABORTED` under its number), and only
+    /// another command turns the wheels again. Without `EXDE_OK` no words came; with it, they
+    /// showed no tape.
     pub const FAILSAFE: Self = Self(16);
-    /// The command numbered `finished_seq` was broken off.
+    /// The command numbered `finished_seq` was ended early.
     pub const ABORTED: Self = Self(32);
     /// The command numbered `finished_seq` was refused.
     pub const REFUSED: Self = Self(64);
-    /// A command that runs once is running.
+    /// A command that runs once is under way.
     pub const BUSY: Self = Self(128);
 
-    /// Whether all of `others` hold.
+    /// Whether all conditions in `others` hold.
     pub const fn contains(self, others: Self) -> bool {
         self.0 & others.0 == others.0
     }
 
-    /// Makes `others` hold too.
+    /// Adds the conditions in `others`.
     pub const fn insert(&mut self, others: Self) {
         self.0 |= others.0;
     }
 
-    /// These and `others`.
+    /// These conditions and those in `others`.
     #[must_use]
     pub const fn with(self, others: Self) -> Self {
         Self(self.0 | others.0)
@@ -113,18 +120,18 @@ impl SteerFlags {
 /// The steering board's report.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SteerData {
-    /// The firmware code being executed; 0 before the first.
+    /// The firmware code of the present command; 0 before the first.
     pub code: u8,
     /// Duty of the left wheel pair, 0 to 255 of full on (AMB-23).
     pub left_duty: u8,
     /// Duty of the right wheel pair, 0 to 255 of full on.
     pub right_duty: u8,
-    /// What holds now.
+    /// The present conditions.
     pub flags: SteerFlags,
     /// The line's offset in half sensor steps, -10 to 10, positive when the line is to the right
     /// (AMB-20). Encoding saturates it.
     pub line_error: i8,
-    /// The `seq` of the last command that ran to its end, was broken off or was refused. Always 0
+    /// The `seq` of the last command that ran to its end, was ended early or was refused. Always 0
     /// from an original board.
     pub finished_seq: u8,
     /// One bit per servo, servo 1 in bit 0: it reports an error or does not answer.
@@ -155,8 +162,8 @@ impl SteerData {
         ];
     }
 
-    /// What an original board means by its eight bytes is not written down anywhere (AMB-12), so
-    /// none is refused; version 1 checks code and line error.
+    /// Nothing documents the meaning of an original board's eight bytes (AMB-12), so none is
+    /// refused. Version 1 checks code and line error.
     pub(crate) fn read(version: Version, payload: &Bytes) -> Result<Self, Fault> {
         let [
             code,

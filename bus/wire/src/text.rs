@@ -1,7 +1,7 @@
-//! Command codes as text: eight binary digits, decimal, or hexadecimal (AMB-4).
+//! Reads and writes command codes as text: eight binary digits, decimal, or hexadecimal (AMB-4).
 //!
-//! Only eight digits of 0 and 1 are binary, so the three forms cannot be confused. Text exists at
-//! the edges of the robot; packets carry numbers.
+//! Only eight digits of 0 and 1 are binary, so the three forms cannot be confused. Text is used
+//! only where data enter or leave the robot; packets carry numbers.
 
 use core::fmt;
 
@@ -10,7 +10,7 @@ use core::fmt;
 pub enum CodeTextError {
     /// There is no digit.
     Empty,
-    /// A character that is no digit of the form the text has.
+    /// A character is not a digit of the form that the text has.
     NotADigit {
         /// The character.
         found: char,
@@ -50,7 +50,7 @@ impl core::error::Error for CodeTextError {}
 ///
 /// # Errors
 ///
-/// When the text has none of the three forms or the number is larger than 255.
+/// The text has none of the three forms, or the number is larger than 255.
 pub fn parse_code(text: &str) -> Result<u8, CodeTextError> {
     if let Some(code) = text.as_bytes().try_into().ok().and_then(binary_digits) {
         return Ok(code);
@@ -67,7 +67,7 @@ pub fn parse_code(text: &str) -> Result<u8, CodeTextError> {
         let digit = found
             .to_digit(radix)
             .ok_or(CodeTextError::NotADigit { found, position })?;
-        // A wrong character further on is the more helpful complaint, so a large number waits.
+        // A wrong character further on is the more useful error, so too large a number waits.
         code = code
             .and_then(|code| u32::from(code).checked_mul(radix)?.checked_add(digit))
             .and_then(|code| u8::try_from(code).ok());
@@ -75,7 +75,7 @@ pub fn parse_code(text: &str) -> Result<u8, CodeTextError> {
     code.ok_or(CodeTextError::TooLarge)
 }
 
-/// The number that eight characters '0' and '1' write, most significant first.
+/// The number that eight characters '0' and '1' write, most significant digit first.
 pub(crate) fn binary_digits(characters: &[u8; 8]) -> Option<u8> {
     characters
         .iter()

@@ -1,4 +1,4 @@
-//! Microseconds since the board's start, and sleep until something happens.
+//! The board's clock: microseconds since the start, and sleep until something happens.
 //!
 //! ```text
 //!   timer 1   clk/8, half a microsecond a tick, free running
@@ -18,19 +18,19 @@ const OCF_B: u8 = bit(2);
 const CS_8: u8 = 0b010;
 const SLEEP_ENABLE_IDLE: u8 = 0b0000_0001;
 
-/// Ticks of the timer in a microsecond.
+/// Ticks of the timer in one microsecond.
 pub const TICKS_PER_US: u16 = 2;
 
 /// Microseconds of one round of the timer.
 const ROUND_US: u32 = 1 << 15;
-/// The longest sleep the compare unit can time; the caller asks again.
+/// The longest sleep that the compare unit can time; for more, the caller sleeps again.
 const LONGEST_US: u32 = 30_000;
-/// Nearer than this the time has come before the compare unit is set.
+/// A time nearer than this would pass before the compare unit is set.
 const SHORTEST_US: u32 = 6;
 
 /// Microseconds at the timer's last overflow.
 static BASE_US: Shared<u32> = Shared::new(0);
-/// 1 when an interrupt has brought something for the main loop.
+/// 1 after an interrupt with news for the main loop.
 static EVENT: SharedByte = SharedByte::new(0);
 
 /// Starts the clock. Interrupts are still off.
@@ -48,7 +48,7 @@ pub fn now_us() -> u32 {
     BASE_US.with(|base_us| {
         let timer = timer1();
         let ticks = get(timer.tcnt1());
-        // An overflow may be waiting for its interrupt.
+        // An overflow may still wait for its interrupt.
         let carried = get(timer.tifr1()) & TOV != 0 && ticks < 1 << 15;
         let base_us = if carried {
             base_us.wrapping_add(ROUND_US)
@@ -65,7 +65,7 @@ pub fn ticks() -> u16 {
     interrupt::free(|_| get(timer1().tcnt1()))
 }
 
-/// Something has happened that the main loop wants to see; called by interrupts.
+/// Interrupts call this when they have news for the main loop.
 #[inline(always)]
 pub fn wake() {
     EVENT.set(1);
@@ -95,29 +95,28 @@ pub fn sleep_until(due_us: u32) {
             unsafe { interrupt::enable() };
             return;
         }
-        // SAFETY: the instruction after `sei` is carried out before any interrupt, so an event
-        // between the look above and `sleep` ends the sleep. No lock is held. `nop` leaves an
-        // interrupt that was waiting one more instruction before the next `cli`: simavr wants it,
-        // the chip does not.
+        // SAFETY: `sei` delays interrupts by one instruction, so an event after the check above
+        // ends the sleep. No lock is held. `nop` gives a waiting interrupt one more instruction
+        // before the next `cli`: simavr needs it, the chip does not.
         unsafe { core::arch::asm!("sei", "sleep", "nop") };
     }
 }
 
-/// Lets compare B interrupt, from the time just set on and not for one that has passed. Interrupts
-/// are off.
+/// Enables the interrupt of compare B for the time that was just set; a past match is cleared. Call
+/// it with interrupts off.
 #[inline(always)]
 pub fn arm_compare_b() {
     put(timer1().tifr1(), OCF_B);
     put(timer1().timsk1(), TOV | OCF_A | OCF_B);
 }
 
-/// Keeps compare B quiet. Interrupts are off.
+/// Disables the interrupt of compare B. Call it with interrupts off.
 #[inline(always)]
 pub fn disarm_compare_b() {
     put(timer1().timsk1(), TOV | OCF_A);
 }
 
-/// Private, as the vectors alone may call them.
+/// Private, because only the interrupt vectors may call them.
 mod handlers {
     use super::*;
 

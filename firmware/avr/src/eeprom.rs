@@ -1,4 +1,4 @@
-//! The EEPROM, byte by byte; nothing waits for it.
+//! Reads and writes the EEPROM byte by byte; nothing waits for it.
 
 use avr_device::interrupt;
 
@@ -8,7 +8,7 @@ const EERE: u8 = bit(0);
 const EEPE: u8 = bit(1);
 const EEMPE: u8 = bit(2);
 
-/// A byte of it; not while one is being written.
+/// Reads a byte; not allowed while a write runs.
 pub fn read(address: u8) -> u8 {
     let eeprom = eeprom();
     put(eeprom.eear(), u16::from(address));
@@ -16,8 +16,7 @@ pub fn read(address: u8) -> u8 {
     get(eeprom.eedr())
 }
 
-/// Begins to write a byte, which takes 3.4 ms; `false`, and nothing happens, while another is being
-/// written.
+/// Begins to write a byte, which takes 3.4 ms. `false`: nothing happens, because a write runs.
 pub fn write(address: u8, value: u8) -> bool {
     let eeprom = eeprom();
     if get(eeprom.eecr()) & EEPE != 0 {
@@ -25,7 +24,7 @@ pub fn write(address: u8, value: u8) -> bool {
     }
     put(eeprom.eear(), u16::from(address));
     put(eeprom.eedr(), value);
-    // The second bit within four cycles after the first.
+    // The second bit must be set within four cycles of the first.
     interrupt::free(|_| {
         set(eeprom.eecr(), EEMPE);
         set(eeprom.eecr(), EEPE);

@@ -1,5 +1,5 @@
-//! What the programs of both boards share: the clock, the UART to the Pi, EEPROM, reset and
-//! watchdog, sleep.
+//! The part that both boards' programs share: clock, UART to the Pi, EEPROM, reset and watchdog,
+//! sleep.
 //!
 //! ```text
 //!   lager-control   decides                     tested on the host
@@ -8,8 +8,9 @@
 //!   this library      clock, UART 0, reset
 //! ```
 //!
-//! These crates only move bits. All decisions are in `lager-control` and below, where the host
-//! tests them. Interrupts never nest and share data through [`shared::Shared`] alone.
+//! These crates only move bits. All decisions are in `lager-control` and in the crates that it
+//! uses; the host tests them. Interrupts never nest, and share data only through
+//! [`shared::Shared`].
 
 #![no_std]
 #![feature(abi_avr_interrupt, asm_experimental_arch)]

@@ -1,7 +1,7 @@
-//! `memcpy`, `memmove` and `memset`, which the compiler calls for.
+//! `memcpy`, `memmove` and `memset`, which the compiler's code calls.
 //!
-//! The compiler's own versions take 1.2 kB of flash and 10 cycles a byte, because they are written
-//! for wide machines. These are loops of four instructions, 8 cycles a byte for a copy.
+//! The compiler's own versions take 1.2 kB of flash and 10 cycles a byte, because they are made for
+//! wide machines. These here are loops of four instructions, with 8 cycles a byte for a copy.
 
 use core::arch::asm;
 use core::ffi::c_void;

@@ -1,6 +1,6 @@
-//! Whole registers by their names in the data sheet, and the peripherals they belong to.
+//! Access to whole registers by their names in the datasheet, and the peripherals that own them.
 //!
-//! The names of bits are those of the data sheet too; they stand where they are used.
+//! Bits have the names of the datasheet too; each module defines those that it uses.
 
 use avr_device::atmega1284p as chip;
 use avr_device::generic::{Readable, Reg, RegisterSpec, Writable};
@@ -13,10 +13,10 @@ macro_rules! peripherals {
             #[inline(always)]
             #[must_use]
             pub fn $name() -> chip::$block {
-                // SAFETY: handing out a peripheral twice is unsound only if both holders rely on
-                // being alone. Nobody here does: each peripheral belongs to one module, which
-                // guards what it shares with its interrupts, and ports are changed bit by bit in
-                // one instruction.
+                // SAFETY: two owners of a peripheral are unsound only if each relies on being
+                // alone. Here none does: each peripheral belongs to one module, which guards the
+                // data that it shares with its interrupts, and bits of ports are changed in one
+                // instruction.
                 unsafe { chip::$block::steal() }
             }
         )*
@@ -59,12 +59,12 @@ pub fn get<R: Readable>(register: &Reg<R>) -> R::Ux {
 /// Writes a whole register.
 #[inline(always)]
 pub fn put<R: Writable>(register: &Reg<R>, bits: R::Ux) {
-    // SAFETY: every value written in this crate is made of bits that the data sheet defines, and no
+    // SAFETY: every value written in this crate consists of bits that the datasheet defines, and no
     // register of this chip can break memory safety: there is no DMA and no memory mapping.
     let _ = unsafe { register.write_with_zero(|w| w.bits(bits)) };
 }
 
-/// Sets the bits of `mask`. Of a port it is one instruction, so no interrupt can come between.
+/// Sets the bits of `mask`. For a port this is one instruction, so no interrupt can come between.
 #[inline(always)]
 pub fn set<R>(register: &Reg<R>, mask: R::Ux)
 where
@@ -74,7 +74,7 @@ where
     put(register, get(register) | mask);
 }
 
-/// Clears the bits of `mask`. Of a port it is one instruction, so no interrupt can come between.
+/// Clears the bits of `mask`. For a port this is one instruction, so no interrupt can come between.
 #[inline(always)]
 pub fn clear<R>(register: &Reg<R>, mask: R::Ux)
 where

@@ -1,16 +1,16 @@
-//! Why the board started, the watchdog, and the way into a reset.
+//! Finds out why the board started, serves the watchdog, and resets the board.
 //!
 //! ```text
 //!   running --64 ms without a kick--> watchdog interrupt: board made safe --16 ms--> reset
 //!   panic   --------------------------> board made safe, mark in RAM      --16 ms--> reset
 //! ```
 //!
-//! The board's program gives the interrupt and the panic handler their way to make it safe.
+//! In the interrupt and in the panic handler the board's program makes the board safe.
 //!
-//! The watchdog waits 64 ms, not the specified 125 ms. A loop that hangs with interrupts off is
-//! reset only by the second time-out: 2 x 125 = 250 ms would break the bound of 200 ms within which
-//! the motors must be off. 2 x 64 = 128 ms keeps it, and so do 142 ms with an oscillator that is 10
-//! % slow. With interrupts on, the first time-out switches the motors off.
+//! The watchdog waits 64 ms and not the specified 125 ms. If a loop hangs with interrupts off, only
+//! the second time-out resets the board. 2 x 125 = 250 ms would exceed 200 ms, within which the
+//! motors must be off; 2 x 64 = 128 ms does not, nor do 142 ms with an oscillator that is 10 %
+//! slow. With interrupts on, the first time-out switches the motors off.
 
 use avr_device::asm::{nop, wdr};
 use avr_device::interrupt;
@@ -21,7 +21,7 @@ use lager_wire::ResetCause;
 
 use crate::register::{cpu, get, put};
 
-/// What a panic leaves in RAM for the program that starts after it.
+/// The mark that a panic leaves in RAM for the next start.
 const PANIC_MARK: u16 = 0x9A1C;
 
 const WDCE_WDE: u8 = 0b0001_1000;
@@ -34,21 +34,21 @@ const WDTCSR: u16 = 0x60;
 
 struct Mark(UnsafeCell<MaybeUninit<u16>>);
 
-// SAFETY: it is written with interrupts off, before a reset and once after it.
+// SAFETY: it is accessed only with interrupts off, before a reset and once after it.
 unsafe impl Sync for Mark {}
 
-/// RAM outlives a reset, and the start-up code leaves this section alone.
+/// RAM keeps its content over a reset, and the start-up code does not clear this section.
 // SAFETY: the section holds nothing else and the cell's content may be anything.
 #[unsafe(link_section = ".noinit")]
 static MARK: Mark = Mark(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Starts the watchdog and tells why the board started. Called first, with interrupts off.
+/// Starts the watchdog and returns why the board started. Call it first, with interrupts off.
 pub fn start() -> ResetCause {
     let flags = get(cpu().mcusr());
-    // As long as the watchdog's flag is set the watchdog cannot be changed.
+    // The watchdog cannot be changed while its reset flag is set.
     put(cpu().mcusr(), 0);
     set_watchdog(BITE_AFTER_64_MS);
-    // SAFETY: the cell is this program's alone; whatever RAM holds after power-on is a number.
+    // SAFETY: only this program uses the cell; any content of the RAM after power-on is a number.
     let panicked = unsafe { MARK.0.get().cast::<u16>().read_volatile() } == PANIC_MARK;
     mark(0);
     lager_control::reset_cause(flags, panicked)
@@ -60,12 +60,12 @@ pub fn kick_watchdog() {
     wdr();
 }
 
-/// Resets the board, which has been made safe, because its main loop hung.
+/// Resets the board after its main loop hung; the caller has made the board safe.
 pub fn after_hang() -> ! {
     reset()
 }
 
-/// Resets the board, which has been made safe, because its program met what it does not allow.
+/// Resets the board after a panic; the caller has made the board safe.
 pub fn after_panic() -> ! {
     mark(PANIC_MARK);
     reset()
@@ -84,7 +84,7 @@ fn mark(value: u16) {
     unsafe { MARK.0.get().cast::<u16>().write_volatile(value) };
 }
 
-/// The timed sequence: the new value within four cycles after WDCE. Interrupts are off.
+/// The timed sequence: writes the new value within four cycles of WDCE. Interrupts are off.
 fn set_watchdog(value: u8) {
     wdr();
     // SAFETY: two writes to the watchdog's register, which memory safety does not depend on.

@@ -1,14 +1,14 @@
-//! Data that an interrupt and the main loop share.
+//! Types for data that an interrupt and the main loop share.
 //!
-//! The chip has one core and its interrupts do not nest, so code that runs with interrupts off is
-//! alone. Locks are held for a few cycles, because the servos' UART must be served within 20 us.
+//! The chip has one core and its interrupts do not nest, so code with interrupts off runs alone.
+//! Locks are held for only a few cycles, because the servos' UART must be served within 20 us.
 //! Queues need no lock.
 
 use avr_device::interrupt::{self, Mutex};
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
-/// A value that is used with interrupts off.
+/// A value that is only used with interrupts off.
 pub struct Shared<T>(Mutex<UnsafeCell<T>>);
 
 impl<T: Send> Shared<T> {
@@ -17,21 +17,21 @@ impl<T: Send> Shared<T> {
         Self(Mutex::new(UnsafeCell::new(value)))
     }
 
-    /// Uses the value, alone. `action` may not use the same value through this again; those here
-    /// call a method or two of the value itself.
+    /// Calls `action` with the value and interrupts off. `action` must not call this on the same
+    /// value; the actions here only call a method or two of the value itself.
     #[inline(always)]
     pub fn with<R>(&self, action: impl FnOnce(&mut T) -> R) -> R {
         interrupt::free(|alone| {
             // SAFETY: interrupts are off and there is one core, so no other use is under way, and
-            // by the rule above `action` does not begin one.
+            // by the rule above `action` begins none.
             action(unsafe { &mut *self.0.borrow(alone).get() })
         })
     }
 
-    /// The same in an interrupt, which is alone without a lock: 9 cycles less.
+    /// The same in an interrupt, which needs no lock: 9 cycles less.
     ///
     /// # Safety
-    /// Called by interrupts only, and they do not nest.
+    /// Only interrupts may call it, and they must not nest.
     #[inline(always)]
     pub unsafe fn in_interrupt<R>(&self, action: impl FnOnce(&mut T) -> R) -> R {
         // SAFETY: by the caller's promise interrupts are off, as in `with`.
@@ -41,8 +41,8 @@ impl<T: Send> Shared<T> {
     }
 }
 
-/// A byte that an interrupt and the main loop share: the chip reads and writes it in one
-/// instruction, so no lock is needed.
+/// A byte that an interrupt and the main loop share. The chip reads and writes it in one
+/// instruction, so it needs no lock.
 pub struct SharedByte(UnsafeCell<u8>);
 
 // SAFETY: every access is one instruction, and there is one core.
@@ -54,14 +54,14 @@ impl SharedByte {
         Self(UnsafeCell::new(value))
     }
 
-    /// What it holds.
+    /// The value.
     #[inline(always)]
     pub fn get(&self) -> u8 {
         // SAFETY: the cell lives as long as `self`.
         unsafe { self.0.get().read_volatile() }
     }
 
-    /// Replaces it.
+    /// Sets the value.
     #[inline(always)]
     pub fn set(&self, value: u8) {
         // SAFETY: as above.
@@ -69,18 +69,18 @@ impl SharedByte {
     }
 }
 
-/// A queue with one end in an interrupt and the other in the main loop. `N` is a power of two; it
-/// holds one less.
+/// A queue between an interrupt and the main loop. `N` is a power of two; the queue holds one
+/// element less.
 ///
 /// ```text
 ///   taken: the next to read --.        .-- added: the next place to write
 ///   slots  . . . . . . . . . . x x x x . . . .
 /// ```
 ///
-/// Each end writes its own index only and after the slot, so neither locks the other out. The
-/// interrupts are what this is made for: bytes for indices, no division and few registers to save
-/// are a third of the cycles that `heapless::spsc` and `heapless::Deque` take, and a byte from a
-/// servo must be fetched within 160.
+/// Each end writes only its own index, after it has used the slot, so neither needs a lock. The
+/// queue is made for interrupts: indices are bytes, there is no division, and few registers must be
+/// saved. It takes a third of the cycles of `heapless::spsc` and `heapless::Deque`, and a byte from
+/// a servo must be fetched within 160 cycles.
 pub struct Ring<T, const N: usize> {
     slots: UnsafeCell<[T; N]>,
     added: SharedByte,
@@ -96,7 +96,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         (N - 1) as u8
     };
 
-    /// An empty queue; `filler` lies in its slots.
+    /// An empty queue whose slots hold `filler`.
     pub const fn new(filler: T) -> Self {
         Self {
             slots: UnsafeCell::new([filler; N]),
@@ -105,7 +105,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         }
     }
 
-    /// Adds an element; one that finds the queue full is lost. Called from one end only.
+    /// Adds an element, or drops it if the queue is full. Only one of the two ends may call it.
     #[inline(always)]
     pub fn push(&self, element: T) {
         let added = self.added.get();
@@ -125,7 +125,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         self.added.set(next);
     }
 
-    /// Takes the oldest element. Called from one end only, which is not the one that adds.
+    /// Takes the oldest element. Only the end that does not add may call it.
     #[inline(always)]
     pub fn pop(&self) -> Option<T> {
         let taken = self.taken.get();
@@ -145,13 +145,13 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         Some(element)
     }
 
-    /// Whether there is nothing to take.
+    /// Whether the queue is empty.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.added.get() == self.taken.get()
     }
 
-    /// How many more elements it takes.
+    /// How many more elements fit.
     pub fn room(&self) -> u8 {
         self.taken
             .get()
@@ -161,30 +161,30 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     }
 }
 
-/// Room for a value that is made at start and lives as long as the program: in RAM that the linker
-/// counts, and not on the stack.
-pub struct Place<T>(UnsafeCell<MaybeUninit<T>>);
+/// Space for a value that is made at start and lives as long as the program. It is in RAM that the
+/// linker counts, not on the stack.
+pub struct StaticCell<T>(UnsafeCell<MaybeUninit<T>>);
 
-// SAFETY: the one use, `fill`, hands the content over to one caller.
-unsafe impl<T: Send> Sync for Place<T> {}
+// SAFETY: only `fill` uses it, and hands the content to one caller.
+unsafe impl<T: Send> Sync for StaticCell<T> {}
 
-impl<T> Place<T> {
-    /// Room, empty.
+impl<T> StaticCell<T> {
+    /// Empty space.
     pub const fn new() -> Self {
         Self(UnsafeCell::new(MaybeUninit::uninit()))
     }
 
-    /// Puts the value there and hands it out.
+    /// Stores the value and returns a reference to it.
     ///
     /// # Safety
-    /// It is called once.
+    /// Call it only once.
     pub unsafe fn fill(&'static self, value: T) -> &'static mut T {
         // SAFETY: by the caller's promise nobody else has a reference to the content.
         unsafe { (*self.0.get()).write(value) }
     }
 }
 
-impl<T> Default for Place<T> {
+impl<T> Default for StaticCell<T> {
     fn default() -> Self {
         Self::new()
     }

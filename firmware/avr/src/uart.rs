@@ -1,4 +1,4 @@
-//! UART 0, the line to the Pi: both directions by interrupt, so that everything else goes on
+//! UART 0, the line to the Pi. Interrupts serve both directions, so that everything else goes on
 //! meanwhile (S4).
 //!
 //! ```text
@@ -24,15 +24,15 @@ const EIGHT_BITS: u8 = 0b0000_0110;
 /// 16 MHz / (16 * baud) - 1: exact at 500 000 Bd, 0.16 % fast at 9600.
 const UBRR: u16 = if cfg!(feature = "baud-9600") { 103 } else { 1 };
 
-/// Bytes of one direction that can wait: five packets.
+/// How many bytes can wait in each direction: five packets.
 const CAPACITY: usize = 64;
 
 static RECEIVED: Ring<u8, CAPACITY> = Ring::new(0);
 static TO_SEND: Ring<u8, CAPACITY> = Ring::new(0);
-/// 1 from the first byte queued to the last stop bit.
+/// 1 from the first queued byte to the last stop bit.
 static SENDING: SharedByte = SharedByte::new(0);
 
-/// What is on beside the interrupt that asks for bytes.
+/// Always on; only the interrupt that asks for bytes is switched.
 const ON: u8 = RXCIE | TXCIE | RXEN | TXEN;
 
 /// Starts both directions. Interrupts are still off.
@@ -44,34 +44,34 @@ pub fn start() {
     put(uart.ucsr0b(), ON);
 }
 
-/// The oldest byte received and not yet read.
+/// The oldest received byte that nobody has read.
 #[inline(never)]
 pub fn read() -> Option<u8> {
     RECEIVED.pop()
 }
 
-/// Queues bytes, all of them or none; whether they were queued.
+/// Queues all bytes or none; returns whether it did.
 #[inline(never)]
 pub fn write(bytes: &[u8]) -> bool {
-    // The interrupt only takes bytes out, so the room found stays.
+    // The interrupt only takes bytes out, so there stays enough room.
     if bytes.len() > usize::from(TO_SEND.room()) {
         return false;
     }
     SENDING.set(1);
     for byte in bytes {
         TO_SEND.push(*byte);
-        // The first byte leaves while the others are being queued.
+        // The first byte leaves while the others are queued.
         interrupt::free(|_| set(usart0().ucsr0b(), UDRIE));
     }
     true
 }
 
-/// Whether everything queued has left to its last stop bit.
+/// Whether the last stop bit of everything queued has left.
 pub fn is_idle() -> bool {
     SENDING.get() == 0
 }
 
-/// Private, as the vectors alone may call them.
+/// Private, because only the interrupt vectors may call them.
 mod handlers {
     use super::*;
 
@@ -86,8 +86,7 @@ mod handlers {
         let uart = usart0();
         if let Some(byte) = TO_SEND.pop() {
             put(uart.udr0(), byte);
-            // A late byte may have let the transmitter run empty: the mark of the end is not this
-            // one's.
+            // A late byte may find TXC set by the byte before; clear it.
             put(uart.ucsr0a(), TXC);
         }
         if TO_SEND.is_empty() {

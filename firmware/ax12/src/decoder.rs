@@ -1,4 +1,4 @@
-//! Reading packets, one byte at a time.
+//! Reads packets from a stream of bytes, one byte at a time.
 //!
 //! ```text
 //!            byte fits the shape        length reached, checksum right
@@ -9,50 +9,50 @@
 //!            at the rest again
 //! ```
 //!
-//! Because only one byte is dropped at a time, a good packet behind noise, or hidden inside a
-//! rejected one, is found as long as its bytes came.
+//! A rejected packet loses only one byte at a time, so the decoder finds every complete good
+//! packet, also behind noise or inside a rejected packet.
 
 use crate::{BROADCAST_ID, ErrorBits, HEADER, Instruction, MAX_FRAME, OVERHEAD, checksum};
 
-/// Decoder for a servo's answers: up to 18 registers.
+/// Decoder for a servo's answers of up to 18 registers.
 pub type StatusDecoder = Decoder<24>;
 
-/// Decoder for everything this crate can write; for servo models.
+/// Decoder for every packet that this crate can write; servo models use it.
 pub type InstructionDecoder = Decoder<MAX_FRAME>;
 
-/// One packet whose checksum fits.
+/// A packet with a correct checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet<'a> {
-    /// The servo asked, or the servo that answers.
+    /// Id of the servo that is asked, or that answers.
     pub id: u8,
     /// The instruction's code, or the error bits of an answer.
     pub code: u8,
-    /// What stands between code and checksum.
+    /// The bytes between code and checksum.
     pub parameters: &'a [u8],
 }
 
 impl Packet<'_> {
-    /// The instruction, when this packet was sent to servos and its code is known.
+    /// The instruction, if the code is known. Only for a packet to servos.
     #[must_use]
     pub fn instruction(&self) -> Option<Instruction> {
         Instruction::from_code(self.code)
     }
 
-    /// The error bits, when this packet came from a servo.
+    /// The error bits. Only for a packet from a servo.
     #[must_use]
     pub fn errors(&self) -> ErrorBits {
         ErrorBits(self.code)
     }
 }
 
-/// What a decoder has met; all counts wrap.
+/// Counts of the decoder; all wrap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
-    /// Packets released.
+    /// Packets returned.
     pub packets: u16,
     /// Packets of the right shape with a wrong checksum.
     pub bad_checksums: u16,
-    /// Bytes dropped while looking for a packet.
+    /// Bytes dropped in the search for a packet.
     pub skipped_bytes: u16,
 }
 
@@ -61,20 +61,20 @@ pub struct Counters {
 pub struct Decoder<const N: usize> {
     bytes: [u8; N],
     used: u8,
-    /// Bytes at the front that belong to the packet released last.
+    /// Bytes at the front that belong to the packet returned last.
     released: u8,
     counters: Counters,
 }
 
-/// What the bytes at the front of the buffer are.
+/// The kind of bytes at the front of the buffer.
 enum Front {
-    /// Not yet enough to tell.
+    /// Too few bytes to decide.
     Open,
-    /// A whole good packet of this length.
+    /// A complete good packet of this length.
     Whole(u8),
-    /// No packet begins here.
+    /// Not the beginning of a packet.
     Nothing,
-    /// The shape of a packet with a wrong checksum.
+    /// A packet with a wrong checksum.
     BadChecksum,
 }
 
@@ -97,14 +97,14 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// Takes the next byte from the wire; a packet comes out with its last byte.
+    /// Takes the next byte from the wire. Returns a packet with its last byte.
     ///
-    /// When a rejected packet had swallowed several good ones, this byte brings the first of them
-    /// and [`Decoder::pending`] the rest.
+    /// If a rejected packet had swallowed several good ones, this returns the first of them and
+    /// [`Decoder::pending`] the others.
     pub fn push(&mut self, byte: u8) -> Option<Packet<'_>> {
         self.forget_released();
         if usize::from(self.used) == N {
-            // Only reached when pending packets were not fetched: the oldest byte gives way.
+            // Only if the caller left packets pending: drops the oldest byte.
             self.drop_front(1);
             self.counters.skipped_bytes = self.counters.skipped_bytes.wrapping_add(1);
         }
@@ -113,19 +113,19 @@ impl<const N: usize> Decoder<N> {
         self.examine()
     }
 
-    /// A further packet among the bytes already pushed.
+    /// The next packet among the bytes that were already pushed.
     pub fn pending(&mut self) -> Option<Packet<'_>> {
         self.forget_released();
         self.examine()
     }
 
-    /// Forgets everything but the counters, as before a new question or after a silence.
+    /// Forgets everything but the counters, for example before a new question or after a silence.
     pub fn reset(&mut self) {
         self.used = 0;
         self.released = 0;
     }
 
-    /// What has been met so far.
+    /// The counts so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
         self.counters

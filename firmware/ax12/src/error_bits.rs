@@ -1,4 +1,4 @@
-//! The error byte of a status packet: which troubles the servo reports.
+//! The error byte of a status packet: the errors that a servo reports.
 
 /// Error bits of a status packet, the same bits as in the registers `ALARM_LED` and
 /// `ALARM_SHUTDOWN`.
@@ -18,7 +18,7 @@ impl ErrorBits {
     pub const RANGE: Self = Self(1 << 3);
     /// The instruction packet's checksum was wrong.
     pub const CHECKSUM: Self = Self(1 << 4);
-    /// The load cannot be held with the torque set.
+    /// The servo cannot hold the load with the torque that is set.
     pub const OVERLOAD: Self = Self(1 << 5);
     /// The instruction is unknown, or an ACTION came without a REG_WRITE.
     pub const INSTRUCTION: Self = Self(1 << 6);

@@ -1,4 +1,4 @@
-//! Writing packets into a fixed buffer.
+//! Writes packets into a fixed buffer.
 
 use core::fmt;
 
@@ -7,9 +7,9 @@ use crate::{BROADCAST_ID, ErrorBits, HEADER, Instruction, MAX_FRAME, OVERHEAD, c
 /// Why a packet could not be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EncodeError {
-    /// More parameters than [`MAX_FRAME`] has room for.
+    /// The parameters do not fit into [`MAX_FRAME`] bytes.
     TooLong {
-        /// Bytes the packet would have had.
+        /// How many bytes the packet would need.
         length: usize,
     },
     /// A servo of a SYNC_WRITE has another number of values than the first.
@@ -54,7 +54,7 @@ impl Frame {
         &self.bytes[..usize::from(self.length)]
     }
 
-    /// Asks servo `id` for a sign of life.
+    /// Asks servo `id` to answer.
     #[must_use]
     pub fn ping(id: u8) -> Self {
         Self::fitting(id, Instruction::Ping, &[])
@@ -71,18 +71,18 @@ impl Frame {
         Self::with_address(id, Instruction::Write, address, values)
     }
 
-    /// Writes `values` from `address` on when [`Frame::action`] comes.
+    /// Writes `values` from `address` on, but only when [`Frame::action`] comes.
     pub fn reg_write(id: u8, address: u8, values: &[u8]) -> Result<Self, EncodeError> {
         Self::with_address(id, Instruction::RegWrite, address, values)
     }
 
-    /// Carries out the writes held back; to all servos with [`BROADCAST_ID`].
+    /// Carries out the writes that servos hold back; for all servos with [`BROADCAST_ID`].
     #[must_use]
     pub fn action(id: u8) -> Self {
         Self::fitting(id, Instruction::Action, &[])
     }
 
-    /// Writes the same registers of several servos at once. Nobody answers.
+    /// Writes the same registers of several servos at once. No servo answers.
     pub fn sync_write(address: u8, servos: &[(u8, &[u8])]) -> Result<Self, EncodeError> {
         let width = servos.first().map_or(0, |(_, values)| values.len());
         let mut builder = Builder::new(BROADCAST_ID, Instruction::SyncWrite.code());
@@ -128,7 +128,7 @@ impl Frame {
         builder.finish()
     }
 
-    /// A packet whose at most two parameters are sure to fit.
+    /// A packet of at most two parameters, which always fit.
     fn fitting(id: u8, instruction: Instruction, parameters: &[u8]) -> Self {
         debug_assert!(parameters.len() <= 2);
         let mut builder = Builder::new(id, instruction.code());
@@ -137,10 +137,10 @@ impl Frame {
     }
 }
 
-/// A packet under construction. It goes on counting when the buffer is full, so that the error can
-/// tell.
+/// A packet under construction. It counts on when the buffer is full, so that the error can give
+/// the length.
 ///
-/// Built in place: the chip takes 500 cycles to move one, and the wheels wait meanwhile.
+/// It is built in place: the chip needs 500 cycles to move it, while the wheels wait.
 struct Builder {
     frame: Frame,
     used: usize,

@@ -1,21 +1,21 @@
-//! What a servo can be asked to do (A4).
+//! The instructions of a servo (A4).
 
-/// An instruction code. The last four names are in the original's listing but not in today's manual
-/// of the servo; they can be decoded and are never sent by this robot (AMB-33).
+/// An instruction code. The four names below with `INST_` are in the original's listing but not in
+/// today's manual of the servo; they can be decoded, but this robot never sends them (AMB-33).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Instruction {
     /// Answer with a status packet.
     Ping = 0x01,
-    /// Parameters: first address, count. Answered with the registers.
+    /// Parameters: first address, count. The servo answers with the registers.
     Read = 0x02,
     /// Parameters: first address, values.
     Write = 0x03,
-    /// As `Write`, but held back until `Action`.
+    /// As `Write`, but the servo waits for `Action`.
     RegWrite = 0x04,
-    /// Carries out the write held back.
+    /// Carries out the waiting write.
     Action = 0x05,
-    /// Back to the factory's values, the id included.
+    /// Restores the factory's values, also the id.
     Reset = 0x06,
     /// `INST_DIGITAL_RESET` of the listing.
     DigitalReset = 0x07,
@@ -23,7 +23,7 @@ pub enum Instruction {
     SystemRead = 0x0C,
     /// `INST_SYSTEM_WRITE` of the listing.
     SystemWrite = 0x0D,
-    /// One write to several servos; broadcast, so nobody answers.
+    /// One write to several servos; as a broadcast, so no servo answers.
     SyncWrite = 0x83,
     /// `INST_SYNC_REG_WRITE` of the listing.
     SyncRegWrite = 0x84,

@@ -1,5 +1,5 @@
-//! Dynamixel protocol 1.0, as the AX-12 servos of the arm speak it at 1 Mbit/s on one half-duplex
-//! wire.
+//! Writes and reads packets of Dynamixel protocol 1.0, which the arm's AX-12 servos use at 1 Mbit/s
+//! on one half-duplex wire.
 //!
 //! ```text
 //! instruction:  FF FF | id | length | instruction | parameter 1..N | checksum
@@ -9,12 +9,12 @@
 //! checksum = !(id + length + instruction|error + parameters), low eight bits
 //! ```
 //!
-//! The codec stands apart from the arm's control because both ends of the wire need it: the
-//! steering board asks, the servo models of the plant answer. It never touches a port, never waits,
-//! never allocates and never decides what a servo should do.
+//! The codec is a crate of its own because both ends of the wire need it: the steering board asks,
+//! and the plant's servo models answer. It touches no port, never waits, never allocates, and does
+//! not decide anything about a servo.
 //!
-//! A packet is written with [`Frame`] and read back, byte by byte, with [`Decoder`]. The two packet
-//! kinds share one shape, so only the reader's place on the wire says which of them a packet is.
+//! [`Frame`] writes a packet, [`Decoder`] reads one byte by byte. Both kinds of packet have the
+//! same shape; only the direction on the wire tells them apart.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -31,10 +31,10 @@ pub use error_bits::ErrorBits;
 pub use frame::{EncodeError, Frame};
 pub use instruction::Instruction;
 
-/// The two bytes every packet begins with.
+/// The two bytes at the beginning of every packet.
 pub const HEADER: [u8; 2] = [0xFF, 0xFF];
 
-/// The id all servos obey and none answers (A5).
+/// All servos obey this id, and none answers (A5).
 pub const BROADCAST_ID: u8 = 0xFE;
 
 /// The highest id a single servo can have.
@@ -43,7 +43,7 @@ pub const MAX_ID: u8 = 0xFD;
 /// Length of a status packet without parameters (A5, `DEFAULT_RETURN_PACKET_SIZE`).
 pub const SHORT_STATUS_LENGTH: usize = 6;
 
-/// Longest packet this crate writes: a SYNC_WRITE of position, speed and torque limit to eight
+/// Longest packet that this crate writes: a SYNC_WRITE of position, speed and torque limit to eight
 /// servos.
 pub const MAX_FRAME: usize = 64;
 

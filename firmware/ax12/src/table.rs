@@ -1,9 +1,9 @@
-//! The servo's control table: the address of every register the original lists (A3) and the shape
-//! of the values this robot uses.
+//! The servo's control table: the addresses of all registers in the original's listing (A3), and
+//! the format of the values that this robot uses.
 //!
-//! Values of two bytes lie low byte first at the address named `_L`. Registers 0..=23 are kept
-//! without power, from [`TORQUE_ENABLE`] on they are lost. Addresses 10, 19..=23 and 45 are not in
-//! today's manual: their names are kept, they are never written (AMB-33).
+//! Values of two bytes have their low byte at the address named `_L`. Registers 0..=23 keep their
+//! values without power, those from [`TORQUE_ENABLE`] on lose them. Addresses 10, 19..=23 and 45
+//! are not in today's manual: they have names here, and the robot never writes them (AMB-33).
 
 #![allow(missing_docs)] // The names are the table's own.
 
@@ -67,7 +67,7 @@ pub const MAX_POSITION: u16 = 1023;
 /// Goal speed that means "as fast as the servo can" in joint mode (A5, `STANDARD_SPEED`; AMB-31).
 pub const FULL_SPEED: u16 = 0;
 
-/// Value of [`RETURN_DELAY_TIME`] from the factory; one unit is 2 microseconds.
+/// Factory value of [`RETURN_DELAY_TIME`]; one unit is 2 microseconds.
 pub const DEFAULT_RETURN_DELAY: u8 = 250;
 
 /// Value of [`BAUD_RATE`] for 1 Mbit/s: bit/s = 2 000 000 / (value + 1).
@@ -76,8 +76,8 @@ pub const BAUD_1_MBIT: u8 = 1;
 /// Value of [`MODEL_NUMBER_L`] of an AX-12.
 pub const MODEL_AX12: u16 = 12;
 
-/// Decodes a present speed or load: ten bits of size, bit 10 set = clockwise, which is negative
-/// here.
+/// Decodes a present speed or load: ten bits of magnitude, and bit 10 set for clockwise, which is
+/// negative here.
 ///
 /// The result is in -1023..=1023.
 #[must_use]
@@ -86,7 +86,7 @@ pub const fn signed(raw: u16) -> i16 {
     if raw & 0x0400 == 0 { size } else { -size }
 }
 
-/// Encodes a speed or load of -1023..=1023 as the register holds it; larger sizes are limited.
+/// Encodes a speed or load of -1023..=1023 for the register; larger magnitudes are limited.
 #[must_use]
 pub const fn unsigned(value: i16) -> u16 {
     let size = value.unsigned_abs();

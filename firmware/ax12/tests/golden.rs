@@ -1,4 +1,4 @@
-//! Published packets, encoded and decoded byte for byte. If a test here fails, do not change the
+//! Encodes and decodes published packets byte for byte. If a test here fails, do not change the
 //! test.
 
 mod vectors;

@@ -1,8 +1,8 @@
-//! What the decoder does with bytes that are not packets.
+//! Feeds the decoder with bytes that are not packets.
 
 use lager_ax12::{ErrorBits, Frame, InstructionDecoder, StatusDecoder};
 
-/// A small fixed generator (xorshift32), so that a failing run is the same run again.
+/// A small fixed generator (xorshift32), so that a failing run can be repeated.
 struct Noise(u32);
 
 impl Noise {
@@ -75,7 +75,7 @@ fn noise_never_panics_and_a_packet_after_a_reset_is_always_read() {
     let good = Frame::ping(7);
     for _ in 0..20_000 {
         for _ in 0..noise.byte() {
-            // Twice as many FF as chance gives, so that headers are common.
+            // FF comes twice as often as by chance, so that headers are common.
             let byte = noise.byte();
             decoder.push(if byte < 0x40 { 0xFF } else { byte });
         }
@@ -98,7 +98,7 @@ fn without_a_reset_noise_hides_at_most_what_it_can_announce() {
             decoder.push(noise.byte());
             while decoder.pending().is_some() {}
         }
-        // A false header can ask for at most 24 bytes: the fifth packet of six bytes ends its wait.
+        // A false header can claim at most 24 bytes, so the fifth packet of six bytes completes it.
         let stream: Vec<u8> = good
             .as_bytes()
             .iter()

@@ -1,11 +1,11 @@
-//! Calibrating the line sensors (E9): the operator moves the array over floor and tape for a while,
-//! and the threshold of every channel becomes the middle of what it saw.
+//! Calibrates the line sensors (E9). The operator moves the array over floor and tape for a while;
+//! then each channel's threshold becomes the middle between its lowest and its highest reading.
 //!
 //! ```text
 //!   idle -- start --> watching -- time is up --> thresholds, idle
 //! ```
 //!
-//! A channel that saw no contrast keeps its threshold.
+//! A channel keeps its threshold if it saw too little contrast.
 
 use lager_wire::LineReading;
 
@@ -14,11 +14,11 @@ use crate::time::reached;
 /// Number of line sensors.
 pub(crate) const CHANNELS: usize = 11;
 
-/// The least span between floor and tape, in ADC steps, that is believed.
+/// A smaller span between floor and tape, in ADC steps, changes nothing.
 const LEAST_CONTRAST: u8 = 40;
 
 #[derive(Debug, Clone)]
-struct Watch {
+struct Extremes {
     ends_us: u32,
     seq: u8,
     reading: [u8; CHANNELS],
@@ -26,14 +26,14 @@ struct Watch {
     highest: [u8; CHANNELS],
 }
 
-/// The thresholds in force, and a calibration while it runs.
+/// The thresholds in force, and the calibration that may be running.
 #[derive(Debug, Clone)]
 pub(crate) struct Calibration {
     thresholds: [u8; CHANNELS],
-    watch: Option<Watch>,
+    watch: Option<Extremes>,
 }
 
-/// A calibration that has come to its end.
+/// A calibration that has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Calibrated {
     /// Number of the setting that started it.
@@ -50,12 +50,12 @@ impl Calibration {
         }
     }
 
-    /// Starts to watch for `span_us`. One that runs under the same number goes on.
+    /// Starts to watch for `span_us`. A running calibration with the same number goes on.
     pub(crate) fn start(&mut self, seq: u8, span_us: u32, now_us: u32) {
         if self.watch.as_ref().is_some_and(|watch| watch.seq == seq) {
             return;
         }
-        self.watch = Some(Watch {
+        self.watch = Some(Extremes {
             ends_us: now_us.wrapping_add(span_us),
             seq,
             reading: [0; CHANNELS],
@@ -73,7 +73,7 @@ impl Calibration {
         self.watch.is_some()
     }
 
-    /// Whether this reading of a channel is tape.
+    /// Whether this reading of a channel means tape.
     pub(crate) fn judge(&mut self, channel: usize, reading: u8) -> bool {
         if let Some(watch) = &mut self.watch {
             watch.reading[channel] = reading;
@@ -83,11 +83,11 @@ impl Calibration {
         reading >= self.thresholds[channel]
     }
 
-    /// What a channel has shown so far, while the watching runs.
+    /// The lowest and highest reading of a channel so far; `None` unless a calibration runs.
     pub(crate) fn seen(&self, channel: u8) -> Option<LineReading> {
         let watch = self.watch.as_ref()?;
         let index = usize::from(channel);
-        // None before the first pass.
+        // `None` before the channel's first reading.
         let contrast = watch.highest[index].checked_sub(watch.lowest[index])?;
         Some(LineReading {
             sensor: channel,
@@ -98,14 +98,14 @@ impl Calibration {
         })
     }
 
-    /// Ends the watching when its time is up.
+    /// Ends the calibration when its time is up.
     pub(crate) fn finish(&mut self, now_us: u32) -> Option<Calibrated> {
         let watch = self.watch.take_if(|watch| reached(now_us, watch.ends_us))?;
         let mut channels = 0;
         for (channel, threshold) in self.thresholds.iter_mut().enumerate() {
             let contrast = watch.highest[channel].saturating_sub(watch.lowest[channel]);
             if contrast >= LEAST_CONTRAST {
-                // The upper half rounds up, so that a reading at the floor's level is never tape.
+                // Rounded up, so that a reading at the floor's level is never tape.
                 *threshold = watch.lowest[channel] + contrast.div_ceil(2);
                 channels += 1;
             }

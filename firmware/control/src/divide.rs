@@ -1,8 +1,8 @@
-//! Division of long numbers, small: the chip has no instruction for it, and the compiler's own
+//! A small division of 32-bit numbers. The chip has no instruction for it, and the compiler's own
 //! routine takes a kilobyte of flash.
 
-/// `dividend / divisor`, rounded down; bit by bit, like on paper, and only as many bits as the
-/// quotient has.
+/// `dividend / divisor`, rounded down. Long division in binary, with as many steps as the quotient
+/// has bits.
 #[inline(never)]
 pub(crate) fn divide(dividend: u32, divisor: u32) -> u32 {
     debug_assert!(divisor > 0);

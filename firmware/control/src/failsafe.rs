@@ -1,4 +1,4 @@
-//! The age of the command: when the Pi falls silent, the robot must not drive on.
+//! Watches the age of the command: the robot must not drive on when the Pi falls silent.
 //!
 //! ```text
 //!              a command                    older than the limit
@@ -6,9 +6,9 @@
 //!                             ^ ^------ renewal or new command --------'
 //! ```
 //!
-//! Expired is a state and not a comparison, because the clock wraps. A renewal ends it: the wheels
-//! take up a renewed setpoint again, because the bridge lets its own lease lapse when no origin
-//! wants the setpoint. A command that runs once was aborted, and stays so until a new number comes.
+//! Expired is a stored state, not a comparison of times, because the clock wraps. A renewal ends
+//! it: the wheels run a renewed setpoint again, because the bridge's lease already makes sure that
+//! somebody still wants it. A command that runs once was aborted, and needs a new number to run.
 
 use crate::time::reached;
 
@@ -19,7 +19,7 @@ enum State {
     Expired,
 }
 
-/// Watches how old the command in force is.
+/// Watches the age of the command in force.
 #[derive(Debug, Clone)]
 pub(crate) struct CommandAge {
     limit_us: u32,
@@ -34,12 +34,12 @@ impl CommandAge {
         }
     }
 
-    /// A command came, or the one in force was renewed.
+    /// A command came, or the Pi renewed the one in force.
     pub(crate) fn renew(&mut self, now_us: u32) {
         self.state = State::Fresh { since_us: now_us };
     }
 
-    /// Whether the command has grown too old just now; once for every silence.
+    /// Whether the command has just become too old; `true` once for each silence.
     pub(crate) fn expires(&mut self, now_us: u32) -> bool {
         let State::Fresh { since_us } = self.state else {
             return false;
@@ -52,7 +52,7 @@ impl CommandAge {
         expires
     }
 
-    /// Whether the board has stopped because of a silence.
+    /// Whether the board has stopped because the Pi was silent.
     pub(crate) fn is_expired(&self) -> bool {
         self.state == State::Expired
     }
@@ -62,7 +62,7 @@ impl CommandAge {
         matches!(self.state, State::Fresh { .. })
     }
 
-    /// When the command will be too old.
+    /// When the command becomes too old.
     pub(crate) fn next_due_us(&self) -> Option<u32> {
         match self.state {
             State::Fresh { since_us } => Some(since_us.wrapping_add(self.limit_us).wrapping_add(1)),

@@ -1,4 +1,4 @@
-//! What following needs: words from the sensor board and, within a gap of the tape, tape (W3, S7).
+//! Gives up following the line when the sensor board's words or the tape stay away (W3, S7).
 //!
 //! ```text
 //!               no word for 100 ms
@@ -7,16 +7,16 @@
 //!      '-------------------------------> lost: tape
 //! ```
 //!
-//! Both states last until the next command: a robot that has lost its line and stands does not
-//! start again by itself because something dark is pushed under its sensors, or a loose plug
-//! touches. The board reports the command as aborted by its failsafe, the bridge ends the order as
-//! `no-word` or `no-tape`, and only a new order follows again.
+//! Both states last until the next command. A robot that stands because it lost its line must not
+//! start again by itself when a dark thing comes under its sensors or a loose plug touches. The
+//! board reports the command as aborted by its failsafe, the bridge ends the order as `no-word` or
+//! `no-tape`, and only a new order makes the robot follow again.
 //!
-//! The Pi judges the longest legal way without tape, because it knows where the robot is: it stops
-//! 80 mm after the line was last seen, and drives 40 mm past the bar of the delivery. A board does
-//! not know millimetres but time: 80 mm are 1.1 s at the cruise speed of 73 mm/s. 2 s leave room
-//! for a low battery, for a way that begins without tape, and for the time the Pi takes to notice.
-//! So the Pi always judges first; if it does not, the board stops the robot 150 mm behind the line.
+//! The Pi knows where the robot is, so it limits the way without tape: it stops 80 mm after it last
+//! saw the line, and drives 40 mm past the bar of the delivery. The board does not measure
+//! distance, only time: 80 mm take 1.1 s at the cruise speed of 73 mm/s. 2 s leave room for a low
+//! battery, a way that begins without tape, and the Pi's reaction. So the Pi always judges first;
+//! if it does not, the board stops the robot 150 mm behind the line.
 
 use lager_wire::LineBits;
 
@@ -24,30 +24,30 @@ use crate::time::{first, reached};
 
 /// How old the last word may be, in microseconds: eight passes of the sensor board at 9600 Bd.
 const WORD_LIMIT_US: u32 = 100_000;
-/// How long words may show no tape, in microseconds.
+/// How long words may come without tape in them, in microseconds.
 const TAPE_LIMIT_US: u32 = 2_000_000;
 
-/// For want of what following was given up.
+/// What stayed away, so that following was given up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Lost {
-    /// Words from the sensor board.
+    /// Words from the sensor board stayed away.
     Words,
-    /// Tape in them.
+    /// Words came, but without tape in them.
     Tape,
 }
 
-/// Watches one following.
+/// Watches the robot while it follows a line.
 #[derive(Debug, Clone)]
 pub(crate) struct Follow {
-    /// When the last word came, or following began.
+    /// When the last word came, or when following began.
     heard_us: u32,
-    /// Since when the words show no tape.
+    /// Since when the words have shown no tape.
     bare_since_us: Option<u32>,
     lost: Option<Lost>,
 }
 
 impl Follow {
-    /// A following that begins now.
+    /// Begins to watch.
     pub(crate) const fn new(now_us: u32) -> Self {
         Self {
             heard_us: now_us,
@@ -56,7 +56,7 @@ impl Follow {
         }
     }
 
-    /// A word from the sensor board that came at `at_us`.
+    /// Takes in a word that came from the sensor board at `at_us`.
     pub(crate) fn on_word(&mut self, bits: LineBits, at_us: u32) {
         self.heard_us = at_us;
         if bits.0 != 0 {
@@ -66,7 +66,7 @@ impl Follow {
         }
     }
 
-    /// Whether it has to be given up just now; once.
+    /// Whether following has to be given up now; `true` once.
     pub(crate) fn gives_up(&mut self, now_us: u32) -> bool {
         if self.lost.is_some() {
             return false;
@@ -82,12 +82,12 @@ impl Follow {
         self.lost.is_some()
     }
 
-    /// For want of what it was given up.
+    /// What stayed away, if following was given up.
     pub(crate) const fn lost(&self) -> Option<Lost> {
         self.lost
     }
 
-    /// When it is given up if nothing comes.
+    /// When following is given up if nothing comes.
     pub(crate) fn next_due_us(&self) -> Option<u32> {
         if self.lost.is_some() {
             return None;

@@ -1,4 +1,4 @@
-//! The IR ranger: a reading of the ADC in, centimetres out (S8, AMB-13, AMB-14).
+//! The IR ranger: turns a reading of the ADC into centimetres (S8, AMB-13, AMB-14).
 //!
 //! ```text
 //!  volt
@@ -11,18 +11,18 @@
 //!        least          most
 //! ```
 //!
-//! Two distances share every voltage above that of the far end. Only the branch beyond the model's
-//! least distance is read. A nearer object reads as the least distance near the peak, and as too
+//! Near the peak, two distances have the same voltage. Only the branch beyond the model's least
+//! distance is used. A nearer object therefore reads as the least distance near the peak and as too
 //! far below it, but never as less than the least distance.
 //!
-//! Between two table points the inverse of the distance is taken as linear in the voltage, which is
-//! how a triangulating sensor works; everything is done in whole numbers.
+//! Between two table points the inverse of the distance is linear in the voltage, as in every
+//! triangulating sensor. All numbers are integers.
 
 use lager_wire::Centimetres;
 
 use crate::divide::divide;
 
-/// A Sharp ranger. The original does not name its own.
+/// A Sharp ranger. The document does not name the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum IrModel {
     /// GP2Y0A21YK0F, 10..=80 cm.
@@ -30,7 +30,7 @@ pub enum IrModel {
     Gp2y0a21,
     /// GP2Y0A41SK0F, 4..=30 cm.
     Gp2y0a41,
-    /// GP2Y0A02YK, 20..=150 cm; the table stands on the data sheet's two typical voltages alone.
+    /// GP2Y0A02YK, 20..=150 cm; its table holds only the two typical voltages of the datasheet.
     Gp2y0a02,
 }
 
@@ -59,7 +59,7 @@ const GP2Y0A21: [Point; 10] = [
     at(84, 800),
 ];
 
-/// Read by hand from the data sheet's curve; sheet gp2y0A41SK of J. Doggen's Arduino distance
+/// Read by hand from the datasheet's curve; sheet gp2y0A41SK of J. Doggen's Arduino distance
 /// library.
 const GP2Y0A41: [Point; 7] = [
     at(604, 40),
@@ -75,7 +75,7 @@ const GP2Y0A41: [Point; 7] = [
 const GP2Y0A02: [Point; 2] = [at(501, 200), at(81, 1500)];
 
 impl IrModel {
-    /// The least distance the model measures; nothing below is ever reported.
+    /// The least distance that the model measures; smaller values are never reported.
     #[must_use]
     pub const fn least_cm(self) -> u8 {
         match self {
@@ -85,7 +85,7 @@ impl IrModel {
         }
     }
 
-    /// The most distance the model measures; beyond it there is no distance.
+    /// The greatest distance that the model measures; farther objects read as too far.
     #[must_use]
     pub const fn most_cm(self) -> u8 {
         match self {
@@ -95,7 +95,7 @@ impl IrModel {
         }
     }
 
-    /// The distance a reading of a 10-bit ADC at 5 V means.
+    /// The distance for a reading of a 10-bit ADC with a 5 V reference.
     #[must_use]
     pub fn distance(self, adc: u16) -> Centimetres {
         let table = self.table();
@@ -121,7 +121,7 @@ impl IrModel {
     }
 }
 
-/// Centimetres between two neighbouring points, by the inverse distance.
+/// Centimetres between two neighbouring points, interpolated over the inverse distance.
 fn between(near: &Point, far: &Point, adc: u16) -> u32 {
     let (near_mm, far_mm) = (u32::from(near.millimetres), u32::from(far.millimetres));
     let from_near = u32::from(near.adc - adc);

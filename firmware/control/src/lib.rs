@@ -7,15 +7,15 @@
 //!             sensors     ranger
 //! ```
 //!
-//! The same code runs on the two ATmega1284P and, in the simulator, on the host: a chip's crate
-//! implements [`SensorBoard`] or [`SteeringBoard`] by moving bits, a simulated body implements them
-//! by arithmetic. Each unit has one entry, `step`, which takes in everything that has arrived,
-//! decides, and returns when it wants to be stepped next. An additional step changes nothing, and a
-//! late step delays the unit but does not confuse it.
+//! The same code runs on the two ATmega1284P and, in the simulator, on the host. A chip's crate
+//! implements [`SensorBoard`] or [`SteeringBoard`] by moving bits, a simulated board by arithmetic.
+//! Each unit has one entry, `step`: it takes in everything that has arrived, decides, and returns
+//! when the caller must step it next. An additional step changes nothing; a late step only delays
+//! the unit.
 //!
 //! Nothing here reads a clock, sleeps, allocates, uses a float or touches a register. Times are
-//! wrapping microseconds in `u32` and are only ever compared over spans far below the clock's round
-//! of 71 minutes.
+//! microseconds in a wrapping `u32`; the code compares only times much less than 71 minutes apart,
+//! after which the clock wraps.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -50,20 +50,20 @@ pub use reset::reset_cause;
 pub use sensor::{SensorConfig, SensorUnit};
 pub use steering::{SteeringConfig, SteeringUnit};
 
-/// Duty of a driving motor unless it follows the line (W1, `PWM_STANDARD`), of 255 (AMB-23).
+/// Duty of a driving motor in every mode except following (W1, `PWM_STANDARD`), of 255 (AMB-23).
 pub const PWM_STANDARD: u8 = 100;
 
-/// Silence inside a packet after which a board gives it up, in microseconds: two bytes at 9600 Bd
-/// (AMB-9) and the pause a USB adapter makes between two of its frames.
+/// A board gives a packet up after this silence inside it, in microseconds: two bytes at 9600 Bd
+/// (AMB-9) and the pause that a USB adapter makes between two of its frames.
 pub const PACKET_GAP_US: u32 = 3_000;
 
-/// Bytes from the Pi that one step takes in at most: what its queue holds. Noise may come faster
-/// than it can be looked at, and the rest of the step must still be reached.
+/// The most bytes from the Pi that one step takes in: as many as its queue holds. Noise can come
+/// faster than the board can look at it, and the step must still reach its other work.
 const MOST_BYTES: u8 = 64;
 
-/// How often a step looks again whether the EEPROM takes the next byte, in microseconds.
+/// How often a step checks whether the EEPROM takes the next byte, in microseconds.
 const EEPROM_POLL_US: u32 = 4_000;
 
-/// How often a step looks again whether the UART has finished, in microseconds; boards that know
-/// step at once.
+/// How often a step checks whether the UART has finished, in microseconds. A board that notices the
+/// end steps at once.
 const UART_POLL_US: u32 = 500;

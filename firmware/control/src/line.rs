@@ -1,4 +1,4 @@
-//! Reading the line: eleven bits in, a class and a signed error out (S7, U13, AMB-18..20).
+//! Reads the line: eleven bits become a class and a signed error (S7, U13, AMB-18..20).
 //!
 //! ```text
 //!   bits 10 9 8 all set, run of five or more    -> mark on the left
@@ -11,9 +11,9 @@
 //!                error: held, +-10 when the line left on that side
 //! ```
 //!
-//! A bar that is met at an angle leaves one corner of the array first, so its last trace is not a
-//! FourWay but tape at one edge. So the reader remembers a possible end of the line from a FourWay
-//! until it sees tape that touches neither edge, which is what a line that goes on looks like:
+//! A bar that the robot meets at an angle leaves one corner of the array first, so its last trace
+//! is tape at one edge and not a FourWay. After a FourWay the reader therefore remembers a possible
+//! end of the line, until it sees tape that touches neither edge: there the line goes on.
 //!
 //! ```text
 //!               FourWay                no tape
@@ -23,7 +23,7 @@
 //!       '---------------------'<---------------------'
 //! ```
 //!
-//! The sensor board takes the class, the steering board the error; both read with the same code.
+//! The sensor board uses the class, the steering board the error; both run this code.
 
 use lager_wire::{LineBits, LineState};
 
@@ -35,19 +35,19 @@ pub const ON_LINE_ERROR: i8 = 2;
 
 const LEFT_MARK: u16 = 0b111_1100_0000;
 const RIGHT_MARK: u16 = 0b000_0001_1111;
-/// Time after a FourWay, counted while tape is seen, in which no tape at all still means that the
-/// line ended there. The sensors leave a bar one after the other, and what they show meanwhile is
-/// no line. 100 ms are 7 mm at cruise speed. Without this time 37 of 60 seeds found the delivery
-/// bar, with it all.
+/// After a FourWay, a reading without any tape means for this long that the line ended there. Only
+/// time in which tape is seen counts. The sensors leave a bar one after the other, and meanwhile
+/// they do not show the line. 100 ms are 7 mm at cruise speed. Without this time the robot found
+/// the delivery bar with 37 of 60 seeds, with it on all 60.
 const END_US: u32 = 100_000;
-/// No reading counts for more than this: after a pause the readings before tell nothing about it.
+/// No reading counts for more than this: older readings say nothing about a pause.
 const LONGEST_READING_US: u32 = 20_000;
 const CENTRE: u16 = 0b000_0111_0000;
 
 /// What one reading of the sensors means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reading {
-    /// The class the Pi is told.
+    /// The class, as the Pi gets it.
     pub state: LineState,
     /// The line's place in half sensor steps, -10..=10, positive = the line is to the right of the
     /// robot.
@@ -60,19 +60,19 @@ pub fn centre_on_tape(bits: LineBits) -> bool {
     bits.0 & CENTRE != 0
 }
 
-/// Classifies readings; holds what a reading alone does not tell.
+/// Classifies readings, and remembers what one reading alone does not show.
 #[derive(Debug, Clone, Default)]
 pub struct LineReader {
     /// The error reported last.
     error: i8,
-    /// For this many more microseconds of the line itself the FourWay before may have been its end.
+    /// The last FourWay may still have been the line's end for this many microseconds of tape.
     at_end_us: u32,
     /// When the last reading was taken.
     last_us: u32,
 }
 
 impl LineReader {
-    /// A reader that has seen nothing and supposes the line in the middle.
+    /// A reader without a past; it assumes that the line is in the middle.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -88,7 +88,7 @@ impl LineReader {
         self.error
     }
 
-    /// Takes in one reading of the sensors, taken at `at_us`.
+    /// Takes in a reading of the sensors from the time `at_us`.
     pub fn read(&mut self, bits: LineBits, at_us: u32) -> Reading {
         let since_us = at_us.wrapping_sub(self.last_us).min(LONGEST_READING_US);
         self.last_us = at_us;
@@ -142,7 +142,7 @@ impl LineReader {
     }
 }
 
-/// Mean place of the set bits in half sensor steps from the middle, halves rounded away from it.
+/// Mean place of the set bits, in half sensor steps from the middle; halves are rounded outwards.
 fn centroid(bits: u16) -> i8 {
     let mut sum = 0_i8;
     let mut count = 0_u8;
@@ -156,7 +156,7 @@ fn centroid(bits: u16) -> i8 {
         place -= 2;
         sensors >>= 1;
     }
-    // The quotient is 10 at most, so taking away is faster than the chip's division of 200 cycles.
+    // The quotient is 10 at most: subtracting is faster than the chip's division of 200 cycles.
     let mut rest = 2 * sum.unsigned_abs() + count;
     let mut size = 0;
     while rest >= 2 * count {

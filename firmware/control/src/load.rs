@@ -1,6 +1,6 @@
-//! How busy a board is: for its status report.
+//! Measures how busy a board is; the board status reports it.
 
-/// Measures between two reports.
+/// Collects working time and the longest pass between two reports.
 #[derive(Debug, Clone)]
 pub(crate) struct Load {
     since_us: u32,
@@ -27,8 +27,8 @@ impl Load {
         self.longest_us = self.longest_us.max(pass_us);
     }
 
-    /// Load in percent and the longest pass in 0.1 ms, both since the last call. Everything waits
-    /// for it, so it makes do with short numbers: the chip divides long ones in 400 cycles each.
+    /// Load in percent and the longest pass in 0.1 ms, both since the last call. The wheels wait
+    /// meanwhile, so it divides only 16-bit numbers: the chip takes 400 cycles for a longer one.
     pub(crate) fn report(&mut self, now_us: u32) -> (u8, u8) {
         let mut span = now_us.wrapping_sub(self.since_us).max(1);
         let mut busy = self.busy_us.min(span);
@@ -43,9 +43,9 @@ impl Load {
     }
 }
 
-/// A hundred times this is still a short number.
+/// A hundred times this still fits 16 bits.
 const LONGEST_SPAN: u32 = u16::MAX as u32 / 100;
-/// The longest pass that can be told, in microseconds.
+/// The longest pass that a report can hold, in microseconds.
 const LONGEST_PASS_US: u32 = 25_500;
 
 #[cfg(test)]

@@ -1,13 +1,12 @@
 //! The line regulator: PD on integers (W3).
 //!
 //! `u = Kp * e + Kd * (e(t) - e(t - 10 ms))`, in duty steps, positive = turn right. P acts on every
-//! word from the sensor board; D is a difference over ten milliseconds however often words come, so
-//! that the gains mean the same at every baud rate. Words that come at another pace are scaled to
-//! it.
+//! word from the sensor board. D is a difference over 10 ms however often words come, so the gains
+//! mean the same at every baud rate; a difference over another time is scaled to 10 ms.
 //!
-//! Where the line is under the outer sensors, P counts once more: `u += Kp * (|e| - 5)` with the
-//! sign of `e`. This brings a robot whose motors need much duty for little speed round the tightest
-//! bend. Without it the error stays at its limit there, and the least further disturbance loses the
+//! While the line is under the outer sensors, P counts once more: `u += Kp * (|e| - 5)` with the
+//! sign of `e`. A robot whose motors need much duty for little speed gets round the tightest bend
+//! with this. Without it the error stays at its limit there, and any small disturbance loses the
 //! line.
 //!
 //! ```text
@@ -37,14 +36,14 @@ impl Default for Gains {
 /// Beyond this error, in half sensor steps, the line is under the outer sensors.
 const OUTER: i8 = 5;
 
-/// The time D is a difference over, in microseconds.
+/// D is the difference over this time, in microseconds.
 const SPAN_US: u32 = 10_000;
-/// The least age of the sample D is taken against.
+/// D uses the newest sample that is at least this old, in microseconds.
 const LEAST_AGE_US: u32 = 7_500;
-/// Samples closer together than this are not all remembered, so that four always reach back far
-/// enough.
+/// A sample is remembered only this long after the one before, in microseconds, so that four
+/// samples always reach back far enough.
 const SPACING_US: u32 = 2_400;
-/// A pause after which older samples tell nothing.
+/// After a pause this long, in microseconds, older samples say nothing.
 const STALE_US: u32 = 50_000;
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,7 +52,7 @@ struct Sample {
     error: i8,
 }
 
-/// The regulator with the samples it remembers, newest first.
+/// The regulator, and the samples that it remembers, newest first.
 #[derive(Debug, Clone, Default)]
 pub struct Pd {
     gains: Gains,
@@ -62,7 +61,7 @@ pub struct Pd {
 }
 
 impl Pd {
-    /// A regulator without a past.
+    /// A regulator that remembers no sample.
     #[must_use]
     pub fn new(gains: Gains) -> Self {
         Self {
@@ -78,12 +77,12 @@ impl Pd {
         self.gains
     }
 
-    /// Changes the gains; the past stays.
+    /// Changes the gains; the samples stay.
     pub fn set_gains(&mut self, gains: Gains) {
         self.gains = gains;
     }
 
-    /// Takes in the error at `now_us` and gives the correction `u` in duty steps.
+    /// Takes in the error at `now_us` and returns the correction `u` in duty steps.
     ///
     /// `error` is in half sensor steps, positive = the line is to the right.
     pub fn update(&mut self, error: i8, now_us: u32) -> i16 {

@@ -1,4 +1,4 @@
-//! Command register, copy register and the flag between them (T2).
+//! The command register, the copy register and the flag between them (T2): which commands run.
 //!
 //! ```text
 //!   reception              the loop
@@ -7,22 +7,22 @@
 //!      '-- differs from copy: sets the flag-'
 //! ```
 //!
-//! Nothing from outside acts directly: reception only writes the command register, and the loop
-//! takes the command over when it is ready. The number of a command tells a repetition from a new
-//! command: the same command with the same number only renews the age, anything else is executed. A
-//! command that differs only in its code is executed too, so that a Pi that starts its numbers
-//! afresh can always stop the robot.
+//! A received command does not act directly. Reception only writes the command register; the loop
+//! takes the command over when it is ready. The number tells a repetition from a new command: the
+//! same command with the same number only renews the age, anything else is executed. A command that
+//! differs only in its code is executed too, so a Pi that restarts its numbers can always stop the
+//! robot.
 
 use lager_wire::SteerCommand;
 
-/// What reception made of a command.
+/// What reception did with a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Receipt {
-    /// The flag is set: the loop has something to take over.
+    /// The flag is set: the loop has a command to take over.
     New,
-    /// The command being executed, or executed last, is wanted still.
+    /// It repeats the command that runs or ran last: the Pi still wants it.
     Renewed,
-    /// A command already refused; it renews nothing.
+    /// It repeats a refused command, and renews nothing.
     AlreadyRefused,
 }
 
@@ -36,7 +36,7 @@ pub struct CommandRegister {
 }
 
 impl CommandRegister {
-    /// Registers in which nothing was ever written.
+    /// Registers without any command.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -47,7 +47,7 @@ impl CommandRegister {
         }
     }
 
-    /// Reception: writes the command register.
+    /// Called by reception: writes the command register.
     pub fn receive(&mut self, command: SteerCommand) -> Receipt {
         if self.copy == Some(command) {
             return Receipt::Renewed;
@@ -60,8 +60,8 @@ impl CommandRegister {
         Receipt::New
     }
 
-    /// The loop: what to judge, once; resets the flag. [`CommandRegister::accept`] or
-    /// [`CommandRegister::refuse`] follows.
+    /// Called by the loop: returns a new command once and resets the flag. The loop then calls
+    /// [`CommandRegister::accept`] or [`CommandRegister::refuse`].
     pub fn take(&mut self) -> Option<SteerCommand> {
         if !core::mem::take(&mut self.flag) {
             return None;
@@ -69,7 +69,7 @@ impl CommandRegister {
         self.command
     }
 
-    /// Takes the command register over into the copy register.
+    /// Copies the command register into the copy register.
     pub fn accept(&mut self) {
         self.copy = self.command;
         self.refused = None;
@@ -80,7 +80,7 @@ impl CommandRegister {
         self.refused = self.command;
     }
 
-    /// The copy register: the command accepted last.
+    /// The copy register: the command that was accepted last.
     #[must_use]
     pub fn copy(&self) -> Option<SteerCommand> {
         self.copy

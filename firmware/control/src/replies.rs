@@ -1,9 +1,9 @@
-//! Answers to settings that wait to be sent.
+//! Holds answers to settings until the board can send them.
 
 use heapless::Deque;
 use lager_wire::SettingReply;
 
-/// The latest answers, in order.
+/// The latest answers, oldest first.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Replies {
     waiting: Deque<SettingReply, 4>,
@@ -16,8 +16,8 @@ impl Replies {
         }
     }
 
-    /// Puts an answer behind the others. The latest matter: when there is no room the oldest gives
-    /// way, and whoever asked asks again.
+    /// Puts an answer behind the others. If there is no room it drops the oldest answer; the Pi
+    /// then asks for it again.
     pub(crate) fn push(&mut self, reply: SettingReply) {
         if self.waiting.is_full() {
             self.waiting.pop_front();

@@ -1,4 +1,4 @@
-//! Why a board started, from what the chip and the program before left behind.
+//! Finds out why a board started, from what the chip and the program before it left.
 
 use lager_wire::ResetCause;
 
@@ -8,10 +8,10 @@ const BROWN_OUT: u8 = 1 << 2;
 const WATCHDOG: u8 = 1 << 3;
 const JTAG: u8 = 1 << 4;
 
-/// The cause that the ATmega's reset flags (`MCUSR`) tell. `panicked` is the mark that a panic
-/// leaves in RAM before it lets the watchdog reset the board; after power-on RAM tells nothing.
+/// The cause that the ATmega's reset flags (`MCUSR`) show. `panicked` is the mark that a panic
+/// leaves in RAM before the watchdog resets the board; after power-on the RAM holds nothing useful.
 ///
-/// Flags gather until the program clears them; the strongest cause counts.
+/// Flags stay set until the program clears them, so there may be several: the strongest counts.
 #[must_use]
 pub const fn reset_cause(flags: u8, panicked: bool) -> ResetCause {
     if flags & POWER_ON != 0 {

@@ -1,5 +1,5 @@
-//! The sensor board: line and distance in, packets to the Pi and words to the steering board out
-//! (S1-S10).
+//! The sensor board's behaviour: it reads line and distance, and sends packets to the Pi and words
+//! to the steering board (S1-S10).
 //!
 //! ```text
 //!   every 5 ms, and not before everything of the last pass has left (S10):
@@ -12,14 +12,13 @@
 //!                                             sensor reads
 //! ```
 //!
-//! The rarer things take the place of a distance, twice a second for the board status. That departs
-//! from the document's FlipFlop, which takes strict turns. But a pass that sends two things is
-//! longer, and delays the next word to the wheels by 0.3 ms. While the line sensors are calibrated
-//! every other distance gives way to what one of them has read, each in its turn.
+//! A rarer packet takes the place of a distance, twice a second for the board status. The
+//! document's FlipFlop takes strict turns instead. But a pass that sends two things is longer, and
+//! delays the next word to the wheels by 0.3 ms. In a calibration, one line sensor's reading takes
+//! the place of every other distance, each sensor in its turn.
 //!
-//! The two handshakes do not wait for each other: without the steering board the Pi is served,
-//! without the Pi the steering board is. Packets and words leave by interrupt beside everything
-//! else (S4).
+//! The two handshakes are independent: without the steering board the unit still serves the Pi, and
+//! without the Pi the steering board. Interrupts send packets and words beside the loop (S4).
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
@@ -41,24 +40,24 @@ use crate::{
 /// The sensor board's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SensorConfig {
-    /// From one pass to the next, in microseconds; longer where the UART is slower.
+    /// Time between two passes, in microseconds; longer on a slower UART.
     pub loop_period_us: u32,
     /// The IR ranger's model.
     pub ir_model: IrModel,
-    /// From this reading of each line sensor on there is tape, leftmost first; in force until a
-    /// calibration, which is kept in EEPROM.
+    /// A line sensor that reads this or more sees tape, leftmost sensor first. A calibration
+    /// replaces these thresholds and keeps its own in EEPROM.
     pub thresholds: [u8; CHANNELS],
-    /// From one board status to the next, in microseconds.
+    /// Time between two board statuses, in microseconds.
     pub status_period_us: u32,
     /// How long a calibration watches the sensors, in microseconds.
     pub calibration_us: u32,
-    /// Silence inside a packet after which it is given up, in microseconds.
+    /// The board gives a packet up after this silence inside it, in microseconds.
     pub gap_us: u32,
 }
 
 impl SensorConfig {
-    /// What the chip runs: pass after pass, as fast as packets and words leave at 500 000 Bd. The
-    /// simulator's robot takes ten times as long, which is enough to drive by and costs a tenth.
+    /// For the chip: passes follow as fast as packets and words leave at 500 000 Bd. The
+    /// simulator's passes take ten times as long, which is fast enough to drive and costs a tenth.
     pub const FAST: Self = Self {
         loop_period_us: 500,
         ..Self::USUAL
@@ -68,8 +67,8 @@ impl SensorConfig {
         loop_period_us: 5_000,
         ir_model: IrModel::Gp2y0a21,
         thresholds: [128; CHANNELS],
-        // Twice a second. It is due a little before the pass that tells it, so that a few
-        // microseconds more or less do not decide which one that is.
+        // Twice a second. It is due a little before its pass, so that a few microseconds do not
+        // decide which pass sends it.
         status_period_us: 499_750,
         calibration_us: 5_000_000,
         gap_us: PACKET_GAP_US,
@@ -82,13 +81,14 @@ impl Default for SensorConfig {
     }
 }
 
-/// The longest a step may be put off, in microseconds; well inside the watchdog's 64 ms.
+/// The longest time between two steps, in microseconds; well below the watchdog's 64 ms.
 const LONGEST_SLEEP_US: u32 = 20_000;
 
-/// The last turn of a round over all line sensors: each has one, and a distance after it.
+/// The last turn of a round over all line sensors; each has two turns: its reading, then a
+/// distance.
 const LAST_TURN: u8 = 2 * LineBits::SENSORS - 1;
 
-/// What the next pass tells the Pi (S3).
+/// Which packet the next pass sends to the Pi (S3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FlipFlop {
     Line,
@@ -106,13 +106,13 @@ pub struct SensorUnit {
     refused: u8,
     reader: LineReader,
     calibration: Calibration,
-    /// While a calibration runs: twice the sensor that is told of, and one more when a distance is.
+    /// Which turn is next in a calibration: twice the sensor's index, plus one if it is a distance.
     turn: u8,
     store: Store<CHANNELS>,
     raw_line: bool,
     flip_flop: FlipFlop,
     pass_due_us: u32,
-    /// When the pass before began; nothing before the first.
+    /// When the last pass began; `None` before the first.
     last_pass_us: Option<u32>,
     status_due_us: u32,
     load: Load,
@@ -145,8 +145,8 @@ impl SensorUnit {
         }
     }
 
-    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which
-    /// the next step is wanted at the latest. Any input wants one at once.
+    /// Takes in everything that has arrived, decides and acts. Returns the board time by which the
+    /// next step must come; any input needs a step at once.
     pub fn step<B: SensorBoard>(&mut self, board: &mut B) -> u32 {
         let now_us = board.now_us();
         board.kick_watchdog();
@@ -155,7 +155,7 @@ impl SensorUnit {
         self.outbox.flush(board);
         if reached(now_us, self.pass_due_us) {
             if !self.has_sent_all(board) {
-                // The step that finds everything sent is to begin as soon as it is.
+                // A step that finds everything sent must come as soon as it is.
                 return now_us.wrapping_add(UART_POLL_US);
             }
             self.pass(board, now_us);
@@ -225,8 +225,8 @@ impl SensorUnit {
     fn pass<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
         self.note_pass(now_us);
         let bits = self.read_line(board);
-        // The wheels wait for the word, so it leaves before anything else is thought about. Nobody
-        // to send to yet is no failure: the next pass has a newer word.
+        // The wheels wait for the word, so it leaves first. If the steering board does not listen
+        // yet, that is no failure: the next pass sends a newer word.
         let _ = board.exde_send(bits.0);
         let reading = self.reader.read(bits, now_us);
         self.finish_calibration(now_us);
@@ -273,8 +273,8 @@ impl SensorUnit {
         LineBits::new(bits)
     }
 
-    /// The second answer to a calibration tells how many channels have a new threshold; anything
-    /// but all of them is out of range.
+    /// Sends the second answer to a calibration: how many channels have a new threshold. The status
+    /// is out of range unless all have one.
     fn finish_calibration(&mut self, now_us: u32) {
         let Some(calibrated) = self.calibration.finish(now_us) else {
             return;
@@ -295,7 +295,7 @@ impl SensorUnit {
         });
     }
 
-    /// What is due beside line and distance.
+    /// The packet that takes the place of a distance, if one is due.
     fn rarer_thing(&mut self, now_us: u32) -> Option<Payload> {
         if !self.link.is_up() {
             return None;
@@ -320,7 +320,7 @@ impl SensorUnit {
         }))
     }
 
-    /// What the next sensor has read in the calibration that runs, every other time.
+    /// What the next sensor has read in the running calibration, every other time.
     fn reading(&mut self) -> Option<Payload> {
         let turn = self.turn;
         let seen = self.calibration.seen(turn / 2)?;

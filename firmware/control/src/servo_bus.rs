@@ -1,16 +1,16 @@
-//! The master of the servos' wire: one question at a time, every wait bounded.
+//! The master of the servos' wire: it asks one question at a time and limits every wait.
 //!
 //! ```text
 //!            send                     answer of the right servo
-//!   idle ------------> waiting ------------------------------------> Answer::Status
+//!   idle ------------> waiting ------------------------------------> ServoAnswer::Status
 //!    ^                  |   ^
 //!    |         time out |   | once more
 //!    |                  v   |
-//!    '-- Answer::None <-- second time out
+//!    '-- ServoAnswer::None <-- second time out
 //! ```
 //!
-//! One wire carries both directions (A1), so nothing is sent while an answer may come. Bytes that
-//! arrive unasked, answers of other servos and answers with a wrong checksum are no answers.
+//! One wire carries both directions (A1), so the board sends nothing while an answer may come. It
+//! ignores unasked bytes, answers of other servos and answers with a wrong checksum.
 
 use heapless::Vec;
 use lager_ax12::{ErrorBits, Frame, StatusDecoder, table};
@@ -18,17 +18,17 @@ use lager_ax12::{ErrorBits, Frame, StatusDecoder, table};
 use crate::SteeringBoard;
 use crate::time::reached;
 
-/// How often a question is put before the servo counts as not answering.
+/// How often the board asks before the servo counts as not answering.
 const ATTEMPTS: u8 = 2;
 
-/// The most bytes of an answer that one poll takes in, so that the wheels do not wait for a whole
-/// one.
+/// The most bytes of an answer that one poll takes in; the wheels would wait too long for a whole
+/// answer.
 const MOST_BYTES: u8 = 4;
 
-/// Registers read at once: present position to moving.
+/// Registers that one look reads: from the present position to the moving flag.
 pub(crate) const LOOK_LENGTH: u8 = table::MOVING - table::PRESENT_POSITION_L + 1;
 
-/// What a servo says about itself.
+/// A servo's state, as it reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Look {
     pub(crate) position: u16,
@@ -51,41 +51,41 @@ impl Look {
     }
 }
 
-/// What became of a question.
+/// How a question ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Answer {
-    /// The servo answered; `look` when registers were asked for and came whole.
+pub(crate) enum ServoAnswer {
+    /// The servo answered; `look` if the question read registers and all came.
     Status {
         errors: ErrorBits,
         look: Option<Look>,
     },
-    /// It did not, twice.
+    /// The servo did not answer twice.
     None,
 }
 
-/// The longest question: a write of six registers. A whole [`Frame`] takes the chip five times as
-/// long to move.
+/// The longest question: it writes six registers. To move a whole [`Frame`] takes the chip five
+/// times as long.
 const LONGEST: usize = 13;
 
 #[derive(Debug, Clone)]
 struct Question {
     bytes: Vec<u8, LONGEST>,
     id: u8,
-    /// Time out of this attempt.
+    /// When this attempt times out.
     due_us: u32,
     attempt: u8,
     /// Whether the board took the bytes of this attempt.
     sent: bool,
 }
 
-/// The wire and the question under way.
+/// The wire, and the question under way.
 #[derive(Debug, Clone)]
 pub(crate) struct ServoBus {
     decoder: StatusDecoder,
     question: Option<Question>,
     reply_timeout_us: u32,
     timeouts: u8,
-    /// Whether the last poll left bytes behind.
+    /// Whether the last poll left bytes unread.
     more: bool,
 }
 
@@ -104,12 +104,12 @@ impl ServoBus {
         self.question.is_none()
     }
 
-    /// Questions that stayed without an answer after both attempts, saturating.
+    /// Questions without an answer after both attempts; stays at 255.
     pub(crate) fn timeouts(&self) -> u8 {
         self.timeouts
     }
 
-    /// When [`ServoBus::poll`] is wanted: at once, or when a waiting question times out.
+    /// When [`ServoBus::poll`] must be called: at once, or when the question times out.
     pub(crate) fn next_due_us(&self, now_us: u32) -> Option<u32> {
         let question = self.question.as_ref()?;
         Some(if self.more { now_us } else { question.due_us })
@@ -121,8 +121,8 @@ impl ServoBus {
         self.ask(&frame, id, board, now_us);
     }
 
-    /// Sets goal position, speed and torque limit in one write. The torque limit goes along because
-    /// a servo that switched itself off has it at 0.
+    /// Sets goal position, speed and torque limit in one write. A servo that has switched itself
+    /// off has a torque limit of 0, so the limit is always written too.
     pub(crate) fn set_goal(
         &mut self,
         id: u8,
@@ -142,8 +142,12 @@ impl ServoBus {
         self.write(id, table::TORQUE_ENABLE, &[1], board, now_us);
     }
 
-    /// Takes in some of what the servos sent; the answer, when the question is settled.
-    pub(crate) fn poll(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Answer> {
+    /// Takes in some of the servos' bytes. Returns the answer when the question has ended.
+    pub(crate) fn poll(
+        &mut self,
+        board: &mut impl SteeringBoard,
+        now_us: u32,
+    ) -> Option<ServoAnswer> {
         self.more = false;
         for _ in 0..MOST_BYTES {
             let Some(byte) = board.servo_read() else {
@@ -153,7 +157,7 @@ impl ServoBus {
             let mut packet = self.decoder.push(byte);
             while let Some(status) = packet {
                 if asked == Some(status.id) {
-                    let answer = Answer::Status {
+                    let answer = ServoAnswer::Status {
                         errors: status.errors(),
                         look: Look::from_registers(status.parameters),
                     };
@@ -168,12 +172,12 @@ impl ServoBus {
         None
     }
 
-    fn wait(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Answer> {
+    fn wait(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<ServoAnswer> {
         let question = self.question.as_mut()?;
         if !question.sent {
             question.sent = board.servo_write(&question.bytes);
             if question.sent {
-                // The servo has its whole time, counted from when it was asked.
+                // The servo's time counts from when the board took the question.
                 question.due_us = now_us.wrapping_add(self.reply_timeout_us);
             }
         }
@@ -189,7 +193,7 @@ impl ServoBus {
         }
         self.question = None;
         self.timeouts = self.timeouts.saturating_add(1);
-        Some(Answer::None)
+        Some(ServoAnswer::None)
     }
 
     fn write(

@@ -1,20 +1,19 @@
-//! How much the two motors differ: the correction that the regulator always had to add, learnt on
-//! straight lines (W3, W6).
+//! Learns how much the two motors differ: on a straight line the regulator must always add the same
+//! correction, and this bias is added to the duties from then on (W3, W6).
 //!
 //! ```text
 //!   settled corrections --> mean of the last second --- at a mark --> bias: left + b, right - b
 //! ```
 //!
-//! The line before a mark of the grid is straight; the way to the delivery need not be. So the mean
-//! counts only when a mark comes, and counts neither at the delivery's bar nor at the first mark
-//! after it, since the line between those two may be curved. The corrections that bring the robot
-//! to its line after a turn say nothing about the sides, and a station's mark may come soon after a
-//! turn.
-//! The bias is exact to a fraction of a duty step, and is rounded up and down in turn: near the
-//! duty at which the wheels break loose, one step may be a tenth of the speed, and half a step too
-//! much bends a way without a line by 5 degrees in 150 mm. The bias is added wherever both sides
-//! should turn alike: to every correction, to turns on the spot, which would otherwise wander, and
-//! to the commands by hand.
+//! The line before a mark of the grid is straight; the way to the delivery may be curved. So the
+//! mean becomes the bias only at a mark, but not at the delivery's bar and not at the first mark
+//! after it. The corrections that bring the robot to its line after a turn say nothing about the
+//! motors, and a station's mark may come soon after a turn, so a following must first settle.
+//! The bias is a fraction of a duty step, rounded up and down in turn: near the duty at which the
+//! wheels break loose, one step may be a tenth of the speed, and half a step too much bends a way
+//! without a line by 5 degrees in 150 mm. The bias is added wherever both sides should turn alike:
+//! to every correction, to turns on the spot (which would otherwise wander) and to the commands by
+//! hand.
 
 use lager_wire::LineState;
 
@@ -22,23 +21,24 @@ use crate::time::reached;
 use crate::wheels::Motors;
 use crate::{Motor, PWM_STANDARD};
 
-/// From one correction that is looked at to the next, in microseconds.
+/// Time from one correction in the mean to the next, in microseconds.
 const PERIOD_US: u32 = 20_000;
-/// The mean is over 2^6 of them.
+/// The mean is over about 2^6 corrections.
 const MEAN_BITS: u8 = 6;
-/// So many at the beginning of a following do not count: the robot comes to its line in these 3 s.
+/// So many corrections do not count when following begins: in these 3 s the robot comes to its
+/// line.
 const SETTLED: u8 = 150;
-/// A mean counts after this many.
+/// The mean is used after this many corrections.
 const LEAST: u8 = 225;
-/// The most bias, in duty steps.
+/// The greatest bias, in duty steps.
 const MOST: i16 = 12;
-/// For so many words the line may look like one after tape to both sides, as the bar does that is
-/// left at an angle: 150 ms.
+/// A robot that leaves the bar at an angle may see a line for so many words after tape on both
+/// sides: 150 ms.
 const ASKEW: u8 = 30;
-/// Stands in `end` where the line has ended and no mark has come since.
+/// Value of `end` after the line has ended, until the next mark.
 const ENDED: u8 = u8::MAX;
 
-/// The mean and the bias.
+/// The mean of the corrections, and the bias learnt from it.
 #[derive(Debug, Clone, Default)]
 pub struct Sides {
     /// In 256ths of a duty step.
@@ -49,13 +49,13 @@ pub struct Sides {
     bias: i16,
     /// The bias before the last mark.
     before: i16,
-    /// So many words may still come before the line ends behind tape to both sides, or [`ENDED`].
-    // One byte for both: with two, the step was so long that a byte of the Pi's waited.
+    /// Words until tape on both sides no longer counts as the line's end, or [`ENDED`].
+    // One byte for both: with two, a step took so long that a byte from the Pi had to wait.
     end: u8,
 }
 
 impl Sides {
-    /// Two sides that are alike as far as is known.
+    /// Both motors alike, as nothing is known yet.
     pub const fn new() -> Self {
         Self {
             mean: 0,
@@ -67,8 +67,8 @@ impl Sides {
         }
     }
 
-    /// A correction in duty steps, the bias in it, that was given while the line was in this state.
-    // In the step itself it would take registers from what cannot wait.
+    /// Takes in a correction in duty steps (bias included) and the line's state when it was given.
+    // Not inlined: in the step itself it would take registers from code that cannot wait.
     #[inline(never)]
     pub fn observe(&mut self, correction: i16, state: LineState, now_us: u32) {
         let before = self.end;
@@ -111,19 +111,19 @@ impl Sides {
         }
     }
 
-    /// The robot does not follow a line.
+    /// To be called while the robot does not follow a line.
     pub fn pause(&mut self) {
         self.mean = self.bias;
         self.seen = 0;
     }
 
-    /// What is added to the left side and taken from the right, in duty steps: over all `round`s
-    /// the mean is exact to a 256th of a step.
+    /// Duty steps to add to the left side and to take from the right. `round` decides how the
+    /// fraction is rounded; over all its values the mean is exact to a 256th of a step.
     pub fn bias(&self, round: u8) -> i16 {
         (self.bias + i16::from(round)) >> 8
     }
 
-    /// Duties that are to move both sides alike.
+    /// Adds the bias to duties that should move both sides alike.
     pub fn alike(&self, motors: Motors, round: u8) -> Motors {
         let bias = self.bias(round);
         let with = |motor: Motor, bias: i16| Motor {
@@ -145,7 +145,7 @@ mod tests {
     const LINE: LineState = LineState::OnLine;
     const MARK: LineState = LineState::FourWay;
 
-    /// The mean over all rounds.
+    /// The mean of the bias over all values of `round`.
     fn bias(sides: &Sides) -> f32 {
         let sum: i32 = (0..=255).map(|round| i32::from(sides.bias(round))).sum();
         sum as f32 / 256.0
@@ -159,7 +159,7 @@ mod tests {
         }
     }
 
-    /// A mean of a second and a half has not forgotten all that was before.
+    /// A mean of a second and a half still holds a little of what was before.
     fn assert_about(bias: f32, expected: f32) {
         assert!((bias - expected).abs() < 0.25, "{bias} for {expected}");
     }
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn a_part_of_a_step_is_learnt_and_given_as_a_mean() {
         let mut sides = Sides::new();
-        // Three quarters of a step, as the regulator gives it.
+        // The regulator gives three quarters of a step.
         for round in 0..400 {
             let correction = i16::from(round % 4 != 0);
             follow(&mut sides, correction, 20, LINE);
@@ -218,7 +218,7 @@ mod tests {
         follow(&mut sides, 4, 10_000, LINE);
         follow(&mut sides, 4, 100, MARK);
         for _ in 0..2 {
-            // A bend, the bar and its end; a bend and the corner.
+            // A bend, the bar and its end, then a bend and the corner.
             follow(&mut sides, 20, 10_000, LINE);
             follow(&mut sides, 20, 100, MARK);
             follow(&mut sides, 20, 100, LineState::DropStation);

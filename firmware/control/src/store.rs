@@ -1,4 +1,4 @@
-//! Settings that outlive the power: two copies in EEPROM, each with a check value.
+//! Keeps settings without power: two copies in EEPROM, each with a check value.
 //!
 //! ```text
 //!   address   0        1         2 .. 2+N    2+N          the second copy the same, from 32 on
@@ -7,27 +7,27 @@
 //!   save: layout = 255 --> counter, settings, CRC --> layout      into the older copy
 //! ```
 //!
-//! A copy counts when its layout and its check value are right; of two, the one with the later
-//! counter. A save clears the layout byte first and writes it last, so a save that is cut off
-//! leaves the other copy in force. The chip takes some milliseconds for a byte: every step hands
-//! over at most one, and nothing waits.
+//! A copy is valid if its layout and its check value are right; of two valid ones the later counter
+//! wins. A save clears the layout byte first and writes it last, so that a save that is cut off
+//! leaves the other copy valid. The chip needs some milliseconds for a byte: every step hands over
+//! at most one, and nothing waits.
 
 use lager_wire::checksum;
 
 use crate::Board;
 
-/// The layout of the settings; a program with another one takes its own defaults.
+/// The layout of the settings. A program with another layout starts with its defaults.
 const LAYOUT: u8 = 1;
 /// What an erased EEPROM holds.
 const ERASED: u8 = 0xFF;
 /// Where the second copy begins.
 const SECOND: u8 = 32;
-/// The longest settings: a copy with layout, counter and check value fits half the EEPROM.
+/// The most bytes of settings, so that a copy with layout, counter and check value fits its half.
 const LONGEST: usize = 11;
 /// A copy of the longest settings.
 const COPY: usize = LONGEST + 3;
 
-/// A save under way: the copy's bytes, and the one to be written next.
+/// A running save: the copy's bytes, and the index of the next one.
 #[derive(Debug, Clone)]
 struct Save {
     copy: [u8; COPY],
@@ -37,16 +37,16 @@ struct Save {
 /// The settings in EEPROM, `N` bytes.
 #[derive(Debug, Clone)]
 pub(crate) struct Store<const N: usize> {
-    /// What is in force there, or will be when the save is done.
+    /// The settings in force in EEPROM, or in force when the save is done.
     kept: Option<[u8; N]>,
     counter: u8,
-    /// Where the next save goes.
+    /// The address that the next save writes to.
     slot: u8,
     save: Option<Save>,
 }
 
 impl<const N: usize> Store<N> {
-    /// The settings found, if there are any.
+    /// Opens the store. Also returns the settings that it found, if any are valid.
     pub(crate) fn load(board: &impl Board) -> (Self, Option<[u8; N]>) {
         const { assert!(N <= LONGEST) };
         let first = read(board, 0);
@@ -71,7 +71,7 @@ impl<const N: usize> Store<N> {
         (store, kept)
     }
 
-    /// Begins to save; settings that are kept already are not written again.
+    /// Begins to save; settings that the EEPROM holds already are not written again.
     pub(crate) fn save(&mut self, settings: [u8; N]) {
         if self.kept == Some(settings) {
             return;
@@ -88,7 +88,7 @@ impl<const N: usize> Store<N> {
         self.save = Some(Save { copy, next: 0 });
     }
 
-    /// Hands over the next byte, if there is one and the EEPROM takes it.
+    /// Hands over the next byte if a save runs and the EEPROM is free.
     pub(crate) fn poll(&mut self, board: &mut impl Board) {
         let Some(save) = &mut self.save else { return };
         let last = N as u8 + 3;
@@ -113,7 +113,7 @@ impl<const N: usize> Store<N> {
     }
 }
 
-/// The counter and the settings of the copy at `slot`, if it counts.
+/// The counter and the settings of the copy at `slot`, if it is valid.
 fn read<const N: usize>(board: &impl Board, slot: u8) -> Option<(u8, [u8; N])> {
     let mut copy = [0; COPY];
     for (byte, address) in copy.iter_mut().zip(slot..).take(N + 3) {
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
     use lager_wire::ResetCause;
 
-    /// An EEPROM that takes every `slow`-th write.
+    /// An EEPROM that accepts every `slow`-th write.
     struct Chip {
         bytes: [u8; crate::EEPROM_LENGTH as usize],
         slow: usize,

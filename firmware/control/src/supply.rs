@@ -1,32 +1,31 @@
-//! Takes the battery's influence out of the wheels' speed. With the same duty a full battery drives
-//! faster than one that is nearly empty, and much faster near the duty at which the wheels break
+//! Keeps the battery's voltage from changing the wheels' speed. With the same duty a full battery
+//! drives faster than a nearly empty one, and much faster near the duty at which the wheels break
 //! loose.
 //!
 //! `duty at the pins = duty * 11.1 V / battery`. Every duty that is decided, ordered or reported is
-//! a duty at 11.1 V, three lithium cells at rest; only the motor drivers get another one. The
-//! battery's voltage is the mean of the last readings, because it sags with every start. Within one
-//! step of a reading of 11.1 V nothing is corrected, nor for a voltage that no battery can have.
+//! meant for 11.1 V (three lithium cells at rest); only the motor drivers get another one. The
+//! voltage is the mean of the last readings, because it sags with every start. Nothing is corrected
+//! within one step of a reading of 11.1 V, or at a voltage that no battery can have.
 
 use crate::Motor;
 use crate::divide::divide;
 use crate::wheels::Motors;
 
-/// The battery all duties are meant for, in tenths of a volt.
+/// All duties are meant for this battery, in tenths of a volt.
 const NOMINAL_DECIVOLTS: u8 = 111;
-/// What three lithium cells can have, in tenths of a volt.
+/// Possible voltages of three lithium cells, in tenths of a volt.
 const BELIEVED: core::ops::RangeInclusive<u8> = 80..=135;
 /// A mean is over this many readings, as a power of two.
 const MEAN_BITS: u8 = 4;
-/// The mean must move by this much to be taken, in sixteenths of a reading's step.
+/// The mean must move this far before it is used, in sixteenths of a reading's step.
 const TAKEN: u16 = 4;
-/// So near to the nominal battery nothing is corrected, in the same unit: the steps below and
-/// above it.
+/// This near to 11.1 V nothing is corrected, in sixteenths of a reading's step.
 const NEAR: u16 = 12;
-/// The factor 1. The largest, 1.39 at the lowest battery, fits 8 bits: what is on the way from the
-/// line to the wheels is two products of bytes.
+/// The factor 1. The largest factor, 1.39 at the lowest battery, still fits 8 bits, so the path
+/// from the line to the wheels needs only two products of bytes.
 const ONE: u8 = 128;
 
-/// The mean of the battery, and the factor that follows from it.
+/// The mean of the battery's readings, and the factor from it.
 #[derive(Debug, Clone)]
 pub(crate) struct Supply {
     /// In sixteenths of a tenth of a volt; 0 before the first reading.
@@ -36,7 +35,7 @@ pub(crate) struct Supply {
 }
 
 impl Supply {
-    /// A battery that was never read.
+    /// A battery without any reading.
     pub(crate) const fn new() -> Self {
         Self {
             mean: 0,
@@ -45,13 +44,13 @@ impl Supply {
         }
     }
 
-    /// A reading of the battery in tenths of a volt.
+    /// Takes in a reading of the battery in tenths of a volt.
     pub(crate) fn observe(&mut self, decivolts: u8) {
         if !BELIEVED.contains(&decivolts) {
             *self = Self::new();
             return;
         }
-        // A reading is cut off to whole steps; the middle of the step is the best guess.
+        // A reading is rounded down; the middle of its step is the best estimate.
         let reading = (u16::from(decivolts) << MEAN_BITS) + (1 << (MEAN_BITS - 1));
         self.mean = if self.mean == 0 {
             reading
@@ -64,7 +63,7 @@ impl Supply {
         }
     }
 
-    /// What the drivers are given for these duties: over all `round`s the mean is exact.
+    /// The drivers' duties for these duties; over all values of `round` the mean is exact.
     pub(crate) fn at_pins(&self, motors: Motors, round: u8) -> Motors {
         (self.scaled(motors.0, round), self.scaled(motors.1, round))
     }
@@ -93,7 +92,7 @@ fn factor(mean: u16) -> u8 {
 mod tests {
     use super::*;
 
-    /// The mean over all rounds.
+    /// The mean over all values of `round`.
     fn at(decivolts: u8, duty: u8) -> f32 {
         let mut supply = Supply::new();
         for _ in 0..100 {
@@ -115,7 +114,7 @@ mod tests {
         for decivolts in [100, 105, 118, 126] {
             let duty = 100.0 * 11.1 / (f32::from(decivolts) / 10.0 + 0.05);
             let at = at(decivolts, 100);
-            // The factor has a step of a 128th.
+            // The factor has steps of 1/128.
             assert!((at - duty).abs() <= 0.5, "{decivolts}: {at}");
         }
         assert_eq!(at(90, 255), 255.0, "there is no more than all");

@@ -1,14 +1,14 @@
-//! Comparing wrapping microseconds.
+//! Compares wrapping microseconds.
 //!
-//! A time is past when it lies less than half the clock's range behind. Code whose time may grow
-//! older than that stores the conclusion instead.
+//! A time is past if it lies less than half the clock's range behind. Code whose times may grow
+//! older stores the result of the comparison instead.
 
 /// Whether `now` is at or past `due`.
 pub(crate) fn reached(now: u32, due: u32) -> bool {
     now.wrapping_sub(due) < 1 << 31
 }
 
-/// The one of two times that comes first; a time already past counts as now.
+/// The earlier of two times; a time already past counts as now.
 pub(crate) fn first(now: u32, one: u32, other: u32) -> u32 {
     if ahead(now, one) <= ahead(now, other) {
         one

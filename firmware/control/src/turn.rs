@@ -8,9 +8,9 @@
 //!             off tape for 5 ms                 '------- time is up ----^
 //! ```
 //!
-//! Without words from the sensor board a turn is purely timed. With them it gets three eighths of
-//! its time more while no tape has come: motors and batteries differ, and a turn that ends before
-//! its tape leaves the robot without a line.
+//! Without words from the sensor board only the time ends a turn. With words, a turn that has not
+//! seen its tape gets three eighths of its time more: motors and batteries differ, and a robot that
+//! turns too little stands without a line.
 
 use lager_wire::LineBits;
 
@@ -20,11 +20,11 @@ use crate::time::reached;
 /// A full turn at the standard duty takes twelve seconds (W4, `STANDARD_THREESIXTY`).
 pub const FULL_TURN_US: u32 = 12_000_000;
 
-/// How long the centre must be off the tape before a turn that began on tape may end on it: longer
-/// than a stain, and two words of a board that sends one every 5 ms.
+/// A turn that began on tape may end on tape only after the centre was off it this long, in
+/// microseconds: longer than a stain, and two words of a board that sends one every 5 ms.
 const OFF_US: u32 = 4_500;
 
-/// Which way round a turn goes.
+/// Direction of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rotation {
     /// Counter-clockwise seen from above.
@@ -33,7 +33,7 @@ pub enum Rotation {
     Right,
 }
 
-/// How far a turn goes.
+/// Angle of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Angle {
     /// 45 degrees, 1.5 s.
@@ -43,7 +43,7 @@ pub enum Angle {
 }
 
 impl Angle {
-    /// How long the turn lasts at most.
+    /// The time after which the turn ends without tape.
     #[must_use]
     pub const fn duration_us(self) -> u32 {
         match self {
@@ -56,7 +56,7 @@ impl Angle {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Tape {
     Unknown,
-    /// `off_since_us` is when a word first showed no tape, with none that did since.
+    /// `off_since_us`: the first of the latest words in a row that show no tape.
     Leaving {
         off_since_us: Option<u32>,
     },
@@ -69,7 +69,7 @@ enum Tape {
 pub struct Turn {
     rotation: Rotation,
     ends_us: u32,
-    /// How much longer it may take while it sees that it is not there.
+    /// Additional time while words show that the tape has not come.
     more_us: u32,
     tape: Tape,
 }
@@ -86,13 +86,13 @@ impl Turn {
         }
     }
 
-    /// Which way round it goes.
+    /// The turn's direction.
     #[must_use]
     pub fn rotation(&self) -> Rotation {
         self.rotation
     }
 
-    /// A word from the sensor board that came at `at_us`.
+    /// Takes in a word that came from the sensor board at `at_us`.
     pub fn on_word(&mut self, bits: LineBits, at_us: u32) {
         self.tape = match (self.tape, centre_on_tape(bits)) {
             (Tape::Unknown | Tape::Leaving { .. }, true) => Tape::Leaving { off_since_us: None },
@@ -112,13 +112,13 @@ impl Turn {
         };
     }
 
-    /// Whether it has come to its end.
+    /// Whether the turn has ended.
     #[must_use]
     pub fn is_over(&self, now_us: u32) -> bool {
         self.tape == Tape::Found || reached(now_us, self.ends_us())
     }
 
-    /// When it ends at the latest.
+    /// When the turn ends at the latest.
     #[must_use]
     pub fn ends_us(&self) -> u32 {
         match self.tape {

@@ -1,4 +1,5 @@
-//! What the wheels are to do: the modes of the wheel commands and the duty each means (W1-W5, T5).
+//! The modes of the wheels, one for each group of wheel commands, and the duties of each mode
+//! (W1-W5, T5).
 //!
 //! ```text
 //!              2,4,6,9                3,5                    7,8,10,11
@@ -7,9 +8,9 @@
 //!      '------------------- 1 ---------------------'---> Standby <-----'
 //! ```
 //!
-//! Every wheel command replaces the mode before it; only a turn ends by itself. In all modes but
-//! following the duty is the standard one or 0. Following is watched ([`crate::follow`]): without
-//! words or tape it is given up, and stays so until the next command.
+//! Every wheel command replaces the mode before it; only a turn ends by itself. The duty is the
+//! standard one or 0 in every mode except following. [`crate::follow`] gives following up without
+//! words or tape; the robot then stands until the next command.
 
 use lager_wire::{LineBits, WheelCommand};
 
@@ -23,7 +24,7 @@ pub(crate) type Motors = (Motor, Motor);
 /// Both sides standing still.
 pub(crate) const STILL: Motors = (Motor::OFF, Motor::OFF);
 
-/// Which way the robot follows the line.
+/// The direction in which the robot follows the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Along {
     Forward,
@@ -39,7 +40,7 @@ enum Mode {
         seq: u8,
         watch: Follow,
     },
-    /// `under_way` is empty until the wheels may turn.
+    /// `under_way` is `None` until the wheels may turn.
     Turn {
         command: WheelCommand,
         seq: u8,
@@ -62,7 +63,7 @@ impl Wheels {
         }
     }
 
-    /// Takes up the mode of a command, in place of what was.
+    /// Enters the mode of a command.
     pub(crate) fn start(&mut self, command: WheelCommand, seq: u8, now_us: u32) {
         let turn = |rotation, angle| Mode::Turn {
             command,
@@ -91,7 +92,7 @@ impl Wheels {
         };
     }
 
-    /// Breaks a turn off; its number, if one was under way.
+    /// Breaks off a turn; returns its number if one was under way.
     pub(crate) fn abort_turn(&mut self) -> Option<u8> {
         let Mode::Turn { seq, .. } = self.mode else {
             return None;
@@ -100,8 +101,7 @@ impl Wheels {
         Some(seq)
     }
 
-    /// Ends a turn that has come to its end; its number then. Starts the time of one that may
-    /// begin.
+    /// Ends a turn that is over, and returns its number. Starts the clock of a turn that may begin.
     pub(crate) fn advance(&mut self, may_turn: bool, now_us: u32) -> Option<u8> {
         let Mode::Turn {
             seq,
@@ -129,7 +129,7 @@ impl Wheels {
         }
     }
 
-    /// A word from the sensor board.
+    /// Takes in a word from the sensor board.
     pub(crate) fn on_word(&mut self, bits: LineBits, at_us: u32) {
         match &mut self.mode {
             Mode::Turn {
@@ -141,7 +141,7 @@ impl Wheels {
         }
     }
 
-    /// Gives up a following that has lost its words or its tape; its number, once.
+    /// Gives up following without words or tape; returns its number once.
     pub(crate) fn give_up(&mut self, now_us: u32) -> Option<u8> {
         match &mut self.mode {
             Mode::Follow { seq, watch, .. } => watch.gives_up(now_us).then_some(*seq),
@@ -149,7 +149,7 @@ impl Wheels {
         }
     }
 
-    /// For want of what following was given up, until the next command.
+    /// What stayed away, if following was given up, until the next command.
     pub(crate) fn lost(&self) -> Option<Lost> {
         match &self.mode {
             Mode::Follow { watch, .. } => watch.lost(),
@@ -157,7 +157,7 @@ impl Wheels {
         }
     }
 
-    /// The motors in this mode. `correction` is the regulator's, `None` when there is no line to
+    /// The motors in this mode. `correction` is the regulator's, or `None` without a line to
     /// follow.
     pub(crate) fn motors(&self, correction: Option<i16>) -> Motors {
         let ahead = Motor::forward(PWM_STANDARD);
@@ -189,12 +189,12 @@ impl Wheels {
         matches!(self.mode, Mode::Turn { .. })
     }
 
-    /// Whether a line is followed.
+    /// Whether the robot follows a line.
     pub(crate) fn follows(&self) -> bool {
         matches!(self.mode, Mode::Follow { .. })
     }
 
-    /// Whether the line is followed forwards.
+    /// Whether the robot follows a line forwards.
     pub(crate) fn follows_forward(&self) -> bool {
         matches!(
             self.mode,
@@ -205,7 +205,7 @@ impl Wheels {
         )
     }
 
-    /// The command this mode is.
+    /// The command of this mode.
     pub(crate) fn command(&self) -> WheelCommand {
         match self.mode {
             Mode::Standby => WheelCommand::Standby,
@@ -221,7 +221,7 @@ impl Wheels {
         }
     }
 
-    /// When a turn under way ends at the latest, or following is given up if nothing comes.
+    /// When a turn ends at the latest, or following is given up if nothing comes.
     pub(crate) fn next_due_us(&self) -> Option<u32> {
         match &self.mode {
             Mode::Turn {
@@ -235,9 +235,9 @@ impl Wheels {
 }
 
 /// Duties around the standard one (AMB-20). Backwards the sensors trail the axle, so the correction
-/// changes its sign and is halved (AMB-21). That is unproven and cannot be stable by itself: any
-/// correction by trailing sensors lets the axle drift off at about speed / sensor distance, so it
-/// is for short ways only.
+/// has the other sign and is halved (AMB-21). That is unproven and cannot be stable: with trailing
+/// sensors any correction lets the axle drift off at about speed / sensor distance. So it is for
+/// short ways only.
 fn follow(along: Along, correction: i16) -> Motors {
     match along {
         Along::Forward => (
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn the_duties_stand_around_the_standard_and_are_clamped() {
-        // Hand-calculated: left = 100 + u, right = 100 - u, both within 0..=255.
+        // Calculated by hand: left = 100 + u, right = 100 - u, both within 0..=255.
         for (u, left, right) in [
             (0, 100, 100),
             (2, 102, 98),

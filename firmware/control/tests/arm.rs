@@ -1,4 +1,4 @@
-//! The arm's commands against eight scripted servos.
+//! Runs the arm's commands against eight scripted servos.
 
 mod support;
 
@@ -149,7 +149,7 @@ fn a_squeeze_ends_at_the_load() {
     done(&mut bench, SQUEEZE, 3_000);
     let gripper = bench.pins.servos.id(8).clone();
     assert_eq!(gripper.position, 400.0);
-    // 40 load a unit: 300 is passed with the goal 8 units inside, in steps of 3.
+    // The load is 40 a unit: the goal passes 300 when it is 8 units inside, in steps of 3.
     assert!(gripper.load <= -300, "{}", gripper.load);
     assert!((389..=392).contains(&gripper.goal), "{}", gripper.goal);
     for pair in gripper.goals.windows(2) {
@@ -161,7 +161,7 @@ fn a_squeeze_ends_at_the_load() {
         .unwrap()
         .1;
     assert_eq!((told.position, told.load), (400, gripper.load));
-    // What is held stays held.
+    // The gripper keeps what it holds.
     bench.run_ms(2_000);
     assert_eq!(bench.pins.servos.id(8).goal, gripper.goal);
 }

@@ -1,4 +1,5 @@
-//! The arm when servos are missing, mute, overloaded, stuck: bounded, flagged, and the others work.
+//! The arm with missing, mute, overloaded or stuck servos: its commands end, the board flags the
+//! servo, and the other servos work.
 
 mod support;
 
@@ -171,7 +172,7 @@ fn an_overloaded_servo_ends_the_movement_and_is_flagged() {
         .1;
     assert_eq!(told.errors, ErrorBits::OVERLOAD.bits());
     done(&mut bench, LEFT, 100);
-    // Once the servo no longer complains the next command puts its torque back and moves it.
+    // Once the servo reports no error, the next command gives it its torque back and moves it.
     bench.pins.servos.id(8).errors = ErrorBits::NONE;
     bench.pins.servos.id(8).torque_limit = 0;
     done(&mut bench, RELEASE, 3_000);
@@ -216,7 +217,7 @@ fn a_wire_that_takes_nothing_is_bounded() {
 
 #[test]
 fn stepping_does_not_sag_under_a_load() {
-    // A servo that hangs 5 units below its goal is stepped from its goal, not from where it hangs.
+    // A servo hangs 5 units below its goal. The step starts from the goal, not from where it hangs.
     let mut bench = Bench::ready();
     bench.pins.servos.id(2).stuck = true;
     bench.pins.servos.id(2).position = 507.0;

@@ -1,9 +1,9 @@
-//! Both boards wired to each other: ExDe with its handshake, from the sensors to the wheels.
+//! Both boards wired to each other, from the sensors over ExDe and its handshake to the wheels.
 
 mod support;
 
 use lager_control::{Motor, SensorConfig, SteeringConfig};
-use lager_exde::{Action, Receiver, Timing, Transmitter};
+use lager_exde::{Receiver, Timing, Transmitter, WireAction};
 use lager_wire::SteerFlags;
 use support::servos::Servos;
 use support::{Bench, SensorBench};
@@ -11,21 +11,21 @@ use support::{Bench, SensorBench};
 const MIDDLE: u16 = 0b000_0111_0000;
 const FOLLOW: u8 = 3;
 
-/// The two benches and the three wires between them, stepped together every 10 us.
+/// The two benches and the three wires between them; a step is 10 us for all.
 struct Robot {
     sensor: SensorBench,
     steering: Bench,
     sender: Transmitter,
-    /// What is left of the sender's wait; nothing while it is ready.
+    /// Rest of the sender's wait; `None` while it is ready.
     wait_us: Option<u16>,
     receiver: Receiver,
-    /// Time since the last pulse, while no silence was told.
+    /// Time since the last pulse; `None` once the receiver knows of the silence.
     since_us: Option<u16>,
     data: bool,
-    /// Words of the sensor board that were handed to the sender.
+    /// Words that the sensor board has handed to the sender.
     begun: usize,
     returns: usize,
-    /// Pulses the steering board does not get.
+    /// So many pulses do not reach the steering board.
     lose: usize,
 }
 
@@ -58,7 +58,7 @@ impl Robot {
         }
     }
 
-    /// Ten microseconds on the wires.
+    /// Lets ten microseconds pass on the wires.
     fn move_wires(&mut self) {
         self.since_us = self.since_us.map(|us| us + 10);
         if self.since_us == Some(Timing::STANDARD.idle_us) {
@@ -80,11 +80,11 @@ impl Robot {
         let Some(step) = step else { return };
         self.wait_us = step.wait_us;
         match step.action {
-            Action::Nothing => {}
-            Action::Place(level) => self.data = level,
-            Action::Release => self.data = false,
-            Action::Pulse if self.lose > 0 => self.lose -= 1,
-            Action::Pulse => {
+            WireAction::Nothing => {}
+            WireAction::Place(level) => self.data = level,
+            WireAction::Release => self.data = false,
+            WireAction::Pulse if self.lose > 0 => self.lose -= 1,
+            WireAction::Pulse => {
                 let word = self
                     .receiver
                     .on_sync(self.data, self.since_us.unwrap_or(u16::MAX));

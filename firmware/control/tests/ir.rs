@@ -1,8 +1,8 @@
-//! The IR curves against Sharp's data, and the laws every curve keeps.
+//! Compares the IR curves with Sharp's data, and checks the laws that every curve keeps.
 //!
-//! The points are copied facts: figure 2 of Sharp's data sheet E4-A00201EN (GP2Y0A21YK0F, white
-//! paper; the drawing is good to about 0.02 V) and the hand-read table gp2y0A41SK of J. Doggen's
-//! Arduino distance library.
+//! The points are copied from figure 2 of Sharp's datasheet E4-A00201EN (GP2Y0A21YK0F, white
+//! paper; the drawing is exact to about 0.02 V) and from the hand-read table gp2y0A41SK of J.
+//! Doggen's Arduino distance library.
 
 use lager_control::ir::IrModel;
 use lager_wire::Centimetres;
@@ -51,12 +51,12 @@ const GP2Y0A41: [(f64, f64); 7] = [
 
 const MODELS: [IrModel; 3] = [IrModel::Gp2y0a21, IrModel::Gp2y0a41, IrModel::Gp2y0a02];
 
-/// What a 10-bit ADC with a 5 V reference makes of a voltage.
+/// What a 10-bit ADC with a 5 V reference reads at a voltage.
 fn adc(volt: f64) -> u16 {
     (volt * 1024.0 / 5.0) as u16
 }
 
-/// The tolerance held: 1 cm or 5 %, whichever is more.
+/// Whether the distance is within 1 cm or 5 %, whichever is more.
 fn near(measured: Centimetres, cm: f64) -> bool {
     let measured = f64::from(measured.get().expect("a distance"));
     (measured - cm).abs() <= (cm * 0.05).max(1.0)

@@ -1,4 +1,4 @@
-//! The line's classes and error, pattern by pattern and over realistic tracks.
+//! Checks the line's classes and error, for single patterns and on realistic tracks.
 
 use lager_control::line::{LineReader, MAX_ERROR, Reading, centre_on_tape};
 use lager_wire::{LineBits, LineState};
@@ -21,7 +21,7 @@ fn read(bits: u16) -> Reading {
     LineReader::new().read(LineBits(bits), 0)
 }
 
-/// A reader that is given a reading every `period_us`.
+/// A reader that gets a reading every `period_us`.
 struct Paced {
     reader: LineReader,
     period_us: u32,
@@ -70,7 +70,7 @@ fn mirrored_patterns_mirror() {
 
 #[test]
 fn mirrored_pasts_mirror() {
-    // A walk through patterns by a fixed generator, taken by two readers, one of them in a mirror.
+    // A generator of fixed patterns feeds two readers; one of them sees the mirror image.
     let (mut one, mut other) = (LineReader::new(), LineReader::new());
     let mut state = 0x2545_u32;
     for _ in 0..50_000 {
@@ -104,9 +104,9 @@ fn patterns_have_the_errors_worked_out_by_hand() {
         (0b00000110001, 4, LineState::LeftOfLine),
         // (-10 + 2) / 2
         (0b10000010000, -4, LineState::RightOfLine),
-        // (0 + 2 + 4 + 6) / 4 = 3; four are no mark
+        // (0 + 2 + 4 + 6) / 4 = 3; four sensors are no mark
         (0b00000111100, 3, LineState::LeftOfLine),
-        // 6 + 8 + 10 + 4 is four sensors at the edge: not yet a mark
+        // (4 + 6 + 8 + 10) / 4 = 7; four sensors at the edge are no mark either
         (0b00000001111, 7, LineState::LeftOfLine),
         (0b00000011111, 0, LineState::StationToRight),
         (0b11111000000, 0, LineState::StationToLeft),
@@ -211,8 +211,7 @@ fn the_centre_is_the_three_middle_sensors() {
     }
 }
 
-/// Tape as rectangles: middle, half length along its own axis, half width, angle to the driving
-/// direction.
+/// A strip of tape: its middle, half its length (mm), and its angle to the driving direction (rad).
 struct Tape {
     x: f64,
     y: f64,
@@ -233,7 +232,7 @@ impl Tape {
     }
 }
 
-/// The line ahead (x forwards, y to the left), from `from` to `to`.
+/// The line straight ahead (x forwards, y to the left), from `from` to `to` in mm.
 fn line(from: f64, to: f64) -> Tape {
     Tape {
         x: f64::midpoint(from, to),
@@ -243,7 +242,7 @@ fn line(from: f64, to: f64) -> Tape {
     }
 }
 
-/// A tape across at x = 0, from `right` to `left`, both in mm from the line.
+/// A strip across the line at x = 0, from `right` to `left`, both in mm from the line.
 fn across(right: f64, left: f64) -> Tape {
     Tape {
         x: 0.0,
@@ -254,12 +253,12 @@ fn across(right: f64, left: f64) -> Tape {
 }
 
 /// Drives the array over the track at an angle in degrees (positive = turned left) and an offset to
-/// the left in mm, and lists every state in order, repetitions left out.
+/// the left in mm. Returns the states in order, without repetitions.
 fn sweep(track: &[Tape], degrees: f64, offset: f64) -> Vec<LineState> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let mut reader = Paced::every(5_000);
     let mut states = Vec::new();
-    // The array passes x = 0 at the offset; 73 mm/s and 5 ms a reading are 0.37 mm.
+    // The array passes x = 0 at the offset. At 73 mm/s and 5 ms a reading, a step is 0.37 mm.
     let mut s = -70.0;
     while s < 120.0 {
         let (x, y) = (s * cos, offset + s * sin);
@@ -402,7 +401,7 @@ fn a_corner_is_a_one_sided_mark_and_then_no_line() {
 
 #[test]
 fn a_line_crossed_at_a_slant_goes_from_side_to_side() {
-    // As when a turn on the spot sweeps the array off the line.
+    // A turn on the spot sweeps the array off the line like this.
     let track = [line(-300.0, 300.0)];
     for (degrees, side) in [
         (20.0, LineState::LeftOfLine),

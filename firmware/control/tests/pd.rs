@@ -1,4 +1,4 @@
-//! The regulator against tables worked out by hand.
+//! Compares the regulator with tables calculated by hand.
 
 use lager_control::pd::{Gains, Pd};
 
@@ -17,7 +17,7 @@ fn table(gains: Gains, start_us: u32, rows: &[(u32, i8, i16)]) {
 
 #[test]
 fn the_originals_gains_over_a_word_every_5_ms() {
-    // u = 2 e + 2 (e - e 10 ms ago); the first two words have no past that old.
+    // u = 2 e + 2 (e - e 10 ms ago); before the first two words there is no sample that old.
     table(
         Gains::default(),
         0,
@@ -68,8 +68,8 @@ fn under_the_outer_sensors_p_counts_once_more() {
 
 #[test]
 fn the_derivative_is_over_ten_milliseconds_at_every_pace() {
-    // A line that wanders one half step every 5 ms changes by 2 in 10 ms: D = 10 * 2, give or take
-    // what a whole number of half steps can be off.
+    // A line that moves one half step every 5 ms changes by 2 in 10 ms: D = 10 * 2, plus or minus
+    // the rounding to whole half steps.
     for pace_us in [500, 1_000, 2_600, 5_000, 8_000, 11_500, 20_000, 40_000] {
         let mut pd = Pd::new(Gains { p: 0, d: 10 });
         for step in 0.. {
@@ -90,7 +90,7 @@ fn the_derivative_is_over_ten_milliseconds_at_every_pace() {
         0,
         &[(0, 0, 0), (12, 3, 5), (24, 0, -5)],
     );
-    // 11.5 ms apart is rounded: 2 * 1 * 10 / 11.5 = 1.74 -> 2.
+    // 11.5 ms apart, a change of 1, rounded: 2 * 1 * 10 / 11.5 = 1.74 -> 2.
     let mut pd = Pd::new(Gains { p: 0, d: 2 });
     pd.update(0, 0);
     assert_eq!(pd.update(1, 11_500), 2);

@@ -1,4 +1,4 @@
-//! The arm's profile: told value by value, obeyed as a whole.
+//! The arm's profile arrives value by value, and the board obeys it as a whole.
 
 mod support;
 
@@ -16,7 +16,7 @@ const SQUEEZE: u8 = 0xF9;
 const RELEASE: u8 = 0xFA;
 const DROP: u8 = 0xFB;
 
-/// A profile that is the default's in nothing.
+/// A profile that differs from the default in every value.
 fn other() -> ArmProfile {
     let pose = |base| ArmPose {
         base,
@@ -41,7 +41,7 @@ fn other() -> ArmProfile {
     profile
 }
 
-/// Tells a setting and reads the answer.
+/// Sends a setting and returns the board's answer.
 fn set(bench: &mut Bench, key: SettingKey, seq: u8, value: i16) -> (i16, SettingStatus) {
     bench.pi.packets.clear();
     bench.send(Payload::Setting(Setting { key, seq, value }));

@@ -1,4 +1,4 @@
-//! The sensor board: its loop, what it tells the Pi, the words to the steering board.
+//! The sensor board: its loop, its packets to the Pi, its words to the steering board.
 
 mod support;
 
@@ -256,7 +256,7 @@ fn settings_sent_together_are_all_answered() {
 #[test]
 fn a_calibration_finds_the_thresholds_of_another_floor() {
     let mut bench = SensorBench::ready(SensorConfig::default());
-    // A darker room: tape reads 110, floor 30. With the built-in thresholds nothing is tape.
+    // In a darker room tape reads 110 and floor 30: below the built-in thresholds, all is floor.
     let dim = |bench: &mut SensorBench, bits: u16| {
         bench.tape(bits);
         for reading in &mut bench.pins.line {
@@ -309,11 +309,11 @@ fn while_a_calibration_runs_each_sensor_tells_in_turn_what_it_has_read() {
     assert_eq!(told(&bench), [], "nothing is calibrated");
     bench.set(SettingKey::Calibrate, 9, 1);
     bench.run_ms(1_000);
-    // The tape goes from under the middle, and is under the leftmost sensor.
+    // The tape moves from the middle to the leftmost sensor.
     bench.tape(0b100_0000_0000);
     bench.run_ms(1_000);
     let readings = told(&bench);
-    // A sensor in every fourth pass of 5 ms, less what a status or an answer takes.
+    // One sensor in every fourth pass of 5 ms, less the passes of a status or an answer.
     assert!((95..=100).contains(&readings.len()), "{}", readings.len());
     let order: Vec<u8> = readings.iter().map(|reading| reading.sensor).collect();
     let expected: Vec<u8> = (0..11).cycle().take(order.len()).collect();
@@ -332,7 +332,7 @@ fn while_a_calibration_runs_each_sensor_tells_in_turn_what_it_has_read() {
     assert_eq!(last(0), seen(0, tape, floor, tape));
     assert_eq!(last(5), seen(5, floor, floor, tape));
     assert_eq!(last(10), seen(10, floor, floor, floor));
-    // The distance is told less often meanwhile, and as often as before afterwards.
+    // In a calibration fewer distances come, and as many as before when it is over.
     bench.run_ms(3_100);
     bench.pi.packets.clear();
     bench.run_ms(1_000);

@@ -1,4 +1,4 @@
-//! The steering board: commands, the wheels, the failsafe.
+//! The steering board: commands, the wheels, the fail-safe.
 
 mod support;
 
@@ -29,7 +29,7 @@ fn flag(bench: &Bench, flag: SteerFlags) -> bool {
     bench.report().flags.contains(flag)
 }
 
-/// How long, in ms, the wheels turned in the last command; the times of the motors' changes.
+/// How long the wheels turned in the last command, in ms, from the times of the motors' changes.
 fn turned_ms(bench: &Bench, motors: (Motor, Motor)) -> Vec<u32> {
     let log = &bench.pins.motor_log;
     log.iter()
@@ -142,7 +142,7 @@ fn a_mark_does_not_steer() {
         bench.line = Some(mark);
         bench.run_ms(100);
         assert_eq!(bench.duties(), (100, 100), "{mark:011b}");
-        // Behind a mark to both sides the error is held for 100 ms.
+        // After a mark on both sides the error is held for 100 ms.
         bench.line = Some(MIDDLE >> 1);
         bench.run_ms(150);
     }
@@ -202,7 +202,7 @@ fn following_that_lost_its_tape_is_over_until_another_command() {
         let mut bench = Bench::ready();
         bench.command(code);
         bench.run_ms(500);
-        // A gap that closes is one.
+        // A short gap in the tape does not end following.
         bench.line = Some(0);
         bench.run_ms(1_900);
         bench.line = Some(MIDDLE);
@@ -256,7 +256,7 @@ fn the_arm_is_locked_until_the_first_standby() {
     assert_eq!(bench.report().finished_seq, seq);
     assert!(flag(&bench, SteerFlags::REFUSED));
     assert_eq!(bench.pins.servos.id(2).goals.len(), goals, "nothing moved");
-    // A turn ends in a standby of the board's own, which is not the Pi's word.
+    // After a turn the board is in standby by itself; the Pi has not ordered it.
     bench.line = Some(0);
     bench.command(LEFT_DIAG);
     bench.run_ms(2_000);
@@ -311,7 +311,7 @@ fn two_equal_turns_in_a_row_are_two_turns_and_a_refresh_is_none() {
     bench.run_ms(3_500);
     assert_eq!(bench.report().finished_seq, first);
     assert_eq!(turned_ms(&bench, TURNING_LEFT), [3_000]);
-    // The same number goes on being sent and moves nothing.
+    // The Pi repeats the same number, and nothing moves.
     bench.run_ms(2_000);
     assert_eq!(turned_ms(&bench, TURNING_LEFT), [3_000]);
     let second = bench.command(LEFT_PERP);
@@ -438,7 +438,7 @@ fn the_failsafe_holds_while_the_clock_goes_round() {
     let mut bench = Bench::ready();
     bench.command(FORWARD);
     bench.renewed = None;
-    // 75 minutes in slices, past the point where a naive age would look young again.
+    // 75 minutes in slices. After that long, a wrapping age would look young again.
     for _ in 0..75 {
         bench.run_ms(60_000);
         assert_eq!(bench.pins.motors, OFF);

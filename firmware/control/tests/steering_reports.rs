@@ -1,4 +1,4 @@
-//! The steering board: what it tells the Pi, when it is stepped, how it takes settings.
+//! The steering board: its messages to the Pi, the times of its steps, its settings.
 
 mod support;
 
@@ -44,7 +44,7 @@ fn ends_in_quick_succession_are_all_reported() {
     bench.line = Some(0);
     let turn = bench.command(LEFT_PERP);
     bench.run_ms(100);
-    // Both packets are read in one step, which ends two commands.
+    // One step reads both packets, and so ends two commands.
     let (refused, stop) = (turn + 1, turn + 2);
     for (code, seq) in [(0x0E, refused), (STANDBY, stop)] {
         let command = Payload::SteerCommand(SteerCommand { code, seq });
@@ -153,8 +153,8 @@ fn on_a_slow_line_reports_are_fewer_and_never_late() {
     bench.run_ms(1_000);
     let reports = bench.reports().len();
     assert!((60..=87).contains(&reports), "{reports}");
-    // A report is made when the line is free, so it is not old when it arrives. Only the rarer
-    // packets stand in a row: an arm's servo and the board's status.
+    // The board makes a report when the line is free, so that it arrives new. Only the rarer
+    // packets (one servo's state, the board's status) wait in a row.
     let waiting = bench
         .pins
         .uart
@@ -311,7 +311,7 @@ fn gains_outlive_the_power() {
     bench.pins.eeprom = eeprom;
     bench.unit = lager_control::SteeringUnit::new(&bench.pins, SteeringConfig::default());
     bench.run_ms(200);
-    // What is not allowed is answered with the value in force.
+    // A value out of range is answered with the value in force.
     bench.set(SettingKey::GainP, 3, -1);
     bench.set(SettingKey::GainD, 4, -1);
     bench.run_ms(20);

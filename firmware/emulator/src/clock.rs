@@ -1,4 +1,4 @@
-//! The chips' time for everybody on this machine, in one shared page.
+//! The chips' time in a shared page, for all processes on this machine.
 //!
 //! Leases and time-outs of the robot's services count the body's time. A simulated body follows the
 //! services' clock. An emulated body cannot promise a speed, so the services follow its clock. The
@@ -8,16 +8,16 @@
 //! byte  0  the letters "LAGERCLK"
 //!       8  version of this layout, 1
 //!      16  sequence: odd while the words below change; read it before and after them
-//!      24  chip time in ns; never goes back, over restarts neither
-//!      32  CLOCK_MONOTONIC in ns when that was the time
+//!      24  chip time in ns; never goes back, not even over restarts
+//!      32  CLOCK_MONOTONIC in ns at that chip time
 //!      40  chip ns in a million real ns, over the last tenth of a second; 0 = not yet known
 //!      48  process id of the emulator; 0 after a clean end
 //!      56  how often an emulator has started on this page
 //! ```
 //!
-//! Between two updates, about half a millisecond, a reader may extrapolate at the rate, but by no
-//! more than a millisecond: then the emulator is late, and time stands still with it. One emulator
-//! at a time writes a page, by `flock`, so that a killed one and its successor cannot turn time
+//! Updates come about every 0.5 ms. Between them a reader may extrapolate at the rate, but by no
+//! more than 1 ms: after that the emulator is late, and the reader's time stands still too. `flock`
+//! lets only one emulator write a page, so a killed emulator and its successor cannot turn time
 //! back.
 #![allow(unsafe_code)] // Mapping a file is; every block says why it is sound.
 
@@ -37,12 +37,12 @@ const MAGIC: u64 = u64::from_ne_bytes(*b"LAGERCLK");
 const VERSION: u64 = 1;
 const WORDS: usize = 8;
 const BYTES: usize = WORDS * 8;
-/// How long a predecessor may take to let go of the page.
+/// How long to wait until the emulator before this one has released the page.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The span over which the rate is measured.
+/// The rate is measured over this time.
 const RATE_SPAN: Duration = Duration::from_millis(100);
 
-/// Why the page cannot be had.
+/// Why a clock page cannot be used.
 #[derive(Debug, Error)]
 pub enum ClockError {
     /// The file cannot be opened or sized.
@@ -50,36 +50,34 @@ pub enum ClockError {
     Open {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// The file is something else.
-    #[error("{0} is not a clock page; choose another place for it")]
+    /// The file has other content.
+    #[error("{0} is not a clock page; choose another file")]
     Foreign(PathBuf),
     /// Another emulator writes it.
-    #[error(
-        "another emulator publishes its time in {0}; end it, or choose another place for this one's"
-    )]
+    #[error("another emulator publishes its time in {0}; end it, or choose another file")]
     Taken(PathBuf),
 }
 
-/// The emulator's end of the page.
+/// The emulator's side of the page.
 #[derive(Debug)]
 pub struct ClockPage {
     words: *mut AtomicU64,
     /// Holds the lock that keeps others from writing.
     _file: File,
-    /// Chip time before this emulator.
+    /// Chip time of the emulators before this one.
     base: u64,
     mark: (u64, u64),
 }
 
 impl ClockPage {
-    /// Opens the page at `path`, or makes it. A page that was there goes on from its time, once
+    /// Opens the page at `path`, or makes it. An existing page continues from its time, as soon as
     /// the emulator that wrote it has ended.
     ///
     /// # Errors
-    /// The file cannot be opened, is no clock page, or is another emulator's.
+    /// The file cannot be opened, is not a clock page, or belongs to a running emulator.
     pub fn open(path: &Path) -> Result<Self, ClockError> {
         let failed = |source| ClockError::Open {
             path: path.to_owned(),
@@ -101,11 +99,11 @@ impl ClockPage {
         }
         let mut content = Vec::new();
         file.read_to_end(&mut content).map_err(failed)?;
-        // Nothing is written before it is known whose file it is.
+        // Check whose file it is before writing to it.
         let base = kept_time(&content).ok_or_else(|| ClockError::Foreign(path.to_owned()))?;
         file.set_len(BYTES as u64).map_err(failed)?;
-        // SAFETY: a new mapping of a file that has this length; only atomics are read and written
-        // in it, here and by readers.
+        // SAFETY: a new mapping of a file of this length; here and in readers it is accessed only
+        // by atomics.
         let words = unsafe {
             mmap(
                 core::ptr::null_mut(),
@@ -126,7 +124,7 @@ impl ClockPage {
         Ok(page)
     }
 
-    /// Tells that the chips have run for `time` since power came on.
+    /// Publishes that the chips have run for `time` since power came on.
     pub fn publish(&mut self, time: Duration) {
         let (chip, real) = (self.base + time.as_nanos() as u64, monotonic_ns());
         let (marked_chip, marked_real) = self.mark;
@@ -156,10 +154,10 @@ impl ClockPage {
         self.word(0).store(MAGIC, Ordering::Release);
     }
 
-    /// Changes words so that no reader takes a mixture.
+    /// Changes words so that no reader gets a mixture of old and new ones.
     fn write<const COUNT: usize>(&self, words: [(usize, u64); COUNT]) {
         let sequence = self.word(2).load(Ordering::Relaxed);
-        // A killed predecessor may have left it odd.
+        // A killed emulator may have left the sequence odd.
         let odd = sequence | 1;
         self.word(2).store(odd, Ordering::Relaxed);
         fence(Ordering::Release);
@@ -171,7 +169,7 @@ impl ClockPage {
 
     fn word(&self, index: usize) -> &AtomicU64 {
         assert!(index < WORDS, "the page has eight words");
-        // SAFETY: inside the mapping, aligned as a page is, and never unmapped before the drop.
+        // SAFETY: inside the mapping, which is page-aligned and stays until the drop.
         unsafe { &*self.words.add(index) }
     }
 }
@@ -179,13 +177,13 @@ impl ClockPage {
 impl Drop for ClockPage {
     fn drop(&mut self) {
         self.write([(6, 0)]);
-        // SAFETY: the mapping was made with this length and nobody has a reference into it.
+        // SAFETY: the mapping has this length, and nobody holds a reference into it.
         let _ = unsafe { munmap(self.words.cast(), BYTES) };
     }
 }
 
-/// The time in a page that was there before, 0 in a file that is empty or was never finished;
-/// nothing if it is something else.
+/// The time in an existing page; 0 if the file is empty or was never finished, `None` if it has
+/// other content.
 fn kept_time(content: &[u8]) -> Option<u64> {
     let word = |index: usize| {
         let bytes = content.get(8 * index..8 * index + 8)?;

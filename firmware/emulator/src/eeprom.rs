@@ -1,8 +1,8 @@
-//! The boards' EEPROM in files, so that settings outlive the process as they outlive a real
-//! board's power.
+//! Keeps the boards' EEPROM in files, so that settings survive the process as a real board's
+//! settings survive a power cut.
 //!
-//! A file is replaced in one step, so a kill leaves the old content or the new. A missing file is
-//! an EEPROM that was never written.
+//! A file is replaced in one step, so a kill leaves either the old or the new content. A missing
+//! file stands for an EEPROM that was never written.
 
 use std::fs;
 use std::io;
@@ -18,7 +18,7 @@ use crate::chip::{Chip, EEPROM};
 pub struct EepromError {
     /// The file.
     path: PathBuf,
-    /// What the system says.
+    /// The system's error.
     source: io::Error,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct EepromFile {
 }
 
 impl EepromFile {
-    /// Fills a chip that has not run with what the file holds.
+    /// Fills the EEPROM of a chip that has not run yet with the file's content.
     pub(crate) fn load(path: &Path, chip: &Chip) -> Result<Self, EepromError> {
         let path = path.to_owned();
         match fs::read(&path) {

@@ -1,4 +1,4 @@
-//! The robot's two boards as chips: the real images in simavr, wired to each other and the world.
+//! Emulates the robot's two boards: the real images run in simavr, wired to each other and a world.
 //!
 //! ```text
 //!   main --> shell: ptys, pace, clock page, truth lines
@@ -7,9 +7,9 @@
 //!               |
 //!             Chip: simavr with its departures from the ATmega1284P put right
 //! ```
-//! Everything but the shell is pure in chip time: the same images, seed and bytes give the same
-//! run. It knows packets only in [`pi`], which plays the Raspberry Pi for tests and
-//! measurements, and never a topic: GPL-3 stays in this executable.
+//! Everything but the shell works in chip time only: the same images, seed and bytes give the same
+//! run. Only [`pi`] knows packets; it plays the Raspberry Pi for tests and measurements. Nothing
+//! here knows a topic. GPL-3 applies to this executable alone.
 
 pub mod chip;
 pub mod clock;
@@ -18,6 +18,5 @@ pub mod measure;
 pub mod pi;
 pub mod rig;
 pub mod shell;
-pub mod truth;
 
 pub use eeprom::EepromError;

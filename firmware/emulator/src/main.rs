@@ -1,9 +1,8 @@
-//! The emulator's command line. No behaviour lives here.
+//! The emulator's command line; it only reads options and starts the parts.
 
 use core::num::NonZeroI32;
-use std::fs;
 use std::io::{self, BufRead};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -14,8 +13,7 @@ use lager_emulator::chip::Image;
 use lager_emulator::measure::measure;
 use lager_emulator::rig::{Images, RigOptions};
 use lager_emulator::shell::{EmulatorConfig, run};
-use lager_emulator::truth::{Hand, TruthLine};
-use lager_plant::{Make, Warehouse};
+use lager_plant::{Hand, Make, Warehouse, WorldState};
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 /// The robot's two boards as chips: the real firmware images in simavr, wired to each other and
@@ -39,42 +37,42 @@ struct Cli {
     /// The steering board's image, an ELF file
     #[arg(long, value_name = "FILE")]
     steering_elf: PathBuf,
-    /// Where the sensor board's serial port is to appear
+    /// Path at which the sensor board's serial port appears
     #[arg(long, value_name = "PATH", required_unless_present = "trace")]
     sensor_link: Option<PathBuf>,
-    /// Where the steering board's serial port is to appear
+    /// Path at which the steering board's serial port appears
     #[arg(long, value_name = "PATH", required_unless_present = "trace")]
     steering_link: Option<PathBuf>,
-    /// A built-in warehouse (small, curved, large) or the path of a warehouse file
+    /// A built-in warehouse (small, curved, large), or the fields of a warehouse file as JSON
     #[arg(long, value_name = "NAME|FILE", default_value = "small")]
     warehouse: String,
-    /// Chooses every imperfection of robot and world
+    /// Seed of every imperfection of robot and world
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Baud rate of the Pi's ends of both lines: that of the images
+    /// Baud rate of both lines; it must be that of the images
     #[arg(long, default_value_t = 500_000)]
     baud: u32,
-    /// Chip time in real time; more than the machine can do means as fast as it can
+    /// Chip time divided by real time; more than the machine can do means as fast as it can
     #[arg(long, default_value_t = 1.0, value_parser = positive)]
     speed: f64,
-    /// Publishes the chips' time in this file, a shared page (src/clock.rs says what is in it)
+    /// Publishes the chips' time in this file, a shared page (src/clock.rs describes it)
     #[arg(long, value_name = "FILE")]
     clock: Option<PathBuf>,
     /// Keeps both boards' EEPROM, and so their settings, in this folder
     #[arg(long, value_name = "FOLDER")]
     eeprom: Option<PathBuf>,
-    /// So many things stand on edges at random, and come and go
+    /// So many things appear on edges at random, and disappear again
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=64))]
     obstacles: u32,
-    /// Writes how the robot really is to standard output, a line of JSON 50 times a second, and
-    /// does what a line on standard input says, which it answers: {"place": {"x_mm": 0, "y_mm": 0,
-    /// "heading_rad": 0}}, {"put": {"between": [[0, 0], [1, 0]]}}, or "take" in place of "put"
+    /// Writes the true state of robot and goods to standard output, 50 lines of JSON a second. Also
+    /// carries out and answers each line on standard input: {"place": {"x": 0, "y": 0, "heading":
+    /// 0}} in mm and rad, {"put": {"from": [0, 0], "to": [1, 0]}}, or "take" in place of "put"
     #[arg(long)]
     truth: bool,
-    /// Goes on with the world of a line that --truth wrote, read from standard input
+    /// Goes on with a world: reads one line on standard input, the `world` of a line from --truth
     #[arg(long)]
     resume: bool,
-    /// Ends with its parent process, which must be this one
+    /// Ends together with its parent process, which must have this id
     #[arg(long, value_name = "PID")]
     parent: Option<i32>,
     /// Instead of serving ports: measures the images in cycles and prints the result as JSON
@@ -96,14 +94,15 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(parent) = cli.parent {
         end_with(parent)?;
     }
+    let warehouse = warehouse(&cli.warehouse)?;
     let images = Images {
         sensor: Image::read(&cli.sensor_elf)?,
         steering: Image::read(&cli.steering_elf)?,
     };
     let rig = RigOptions {
-        warehouse: warehouse(&cli.warehouse)?,
+        warehouse,
         seed: cli.seed,
-        // Figures are measured on the robot as drawn, so that they can be compared.
+        // Measurements use the robot as drawn, so that figures can be compared.
         make: match cli.sensor_link {
             Some(_) => Make::Varied,
             None => Make::Nominal,
@@ -137,14 +136,14 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
     ] {
         signal_hook::flag::register(signal, Arc::clone(&shutdown))?;
     }
-    // A file that may not become longer (`ulimit -f`) is an error of whoever writes it.
+    // Without this a limit on file sizes (`ulimit -f`) would kill the process; now writing fails.
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
     run(&images, config, &shutdown)?;
     Ok(())
 }
 
-/// Binds this process's life to its parent's: the kernel sends SIGTERM when that one ends, however
-/// it ends.
+/// Ends this process with its parent: the kernel sends SIGTERM when the parent ends, for any
+/// reason.
 fn end_with(parent: i32) -> Result<(), Box<dyn std::error::Error>> {
     set_parent_process_death_signal(Some(Signal::TERM))?;
     if getppid().map(Pid::as_raw_nonzero).map(NonZeroI32::get) != Some(parent) {
@@ -153,31 +152,31 @@ fn end_with(parent: i32) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn warehouse(name: &str) -> Result<Warehouse, String> {
-    if let Some(warehouse) = Warehouse::builtin(name) {
-        return Ok(warehouse);
-    }
-    let text = fs::read_to_string(Path::new(name)).map_err(|error| {
-        format!(
-            "there is no warehouse `{name}`: the built-in ones are {}, anything else is read as a file ({error})",
-            Warehouse::BUILTIN.join(", ")
-        )
-    })?;
-    toml::from_str(&text)
-        .map_err(|error| format!("the warehouse file {name} is not valid: {error}"))
+fn warehouse(text: &str) -> Result<Warehouse, String> {
+    Warehouse::builtin(text).map_or_else(
+        || {
+            serde_json::from_str(text).map_err(|error| {
+                format!(
+                    "`{text}` is neither a built-in warehouse ({}) nor the JSON of one ({error})",
+                    Warehouse::BUILTIN.join(", ")
+                )
+            })
+        },
+        Ok,
+    )
 }
 
-fn kept() -> Result<TruthLine, String> {
+fn kept() -> Result<WorldState, String> {
     let mut line = String::new();
     io::stdin()
         .lock()
         .read_line(&mut line)
-        .map_err(|error| format!("the kept world cannot be read from standard input: {error}"))?;
+        .map_err(|error| format!("cannot read the world from standard input: {error}"))?;
     serde_json::from_str(&line)
-        .map_err(|error| format!("standard input has no line of --truth: {error}"))
+        .map_err(|error| format!("the line on standard input is not a world: {error}"))
 }
 
-/// What standard input has hands do, a line each, from a thread that ends with its last line.
+/// Reads a person's actions from standard input, one a line, in a thread that ends with the input.
 fn hands() -> Receiver<Hand> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
@@ -186,7 +185,7 @@ fn hands() -> Receiver<Hand> {
                 Ok(hand) if sender.send(hand).is_err() => return,
                 Ok(_) => {}
                 Err(error) => {
-                    eprintln!("lager-emulator: `{line}` is nothing that hands can do: {error}");
+                    eprintln!("lager-emulator: `{line}` is not an action on the world: {error}");
                 }
             }
         }

@@ -1,9 +1,9 @@
-//! What the images do, in cycles: exact, and the same in every run.
+//! Measures how fast the images react, in exact chip cycles that are the same in every run.
 //!
 //! ```text
 //!   robot follows a straight line, settled; at one of many phases of both boards' loops
 //!   the tape jumps two sensors aside
-//!       |----- tape to UART: the first start bit of the line packet that tells
+//!       |----- tape to UART: the first start bit of the line packet that reports it
 //!       |----- tape to duty: the write that gives a motor another duty
 //! ```
 //! Only `real_time_factor` depends on the machine.
@@ -20,39 +20,39 @@ use crate::chip::{FREQUENCY, InterruptStatistics};
 use crate::pi::{Pi, run_for, run_until};
 use crate::rig::{Board, Images, Rig, RigError, RigOptions};
 
-/// How long both boards have to come up.
+/// Both boards have this long to connect to the Pi.
 const COMING_UP: Duration = Duration::from_millis(600);
-/// From one trial's start to its jump, in cycles: 30 ms, and so many byte times and a phase.
+/// Time from a trial's start to its jump, in cycles: 30 ms, some byte times, and a phase.
 const SETTLING: u64 = FREQUENCY * 30 / 1_000;
 const SETTLING_BYTES: u64 = 30;
-/// A robot whose duties changed less than this before the jump is not settled, in cycles: 15 ms.
+/// If a duty changed this shortly before the jump, the robot is not settled; in cycles: 15 ms.
 const QUIET: u64 = FREQUENCY * 15 / 1_000;
-/// How long a jump may take to show, in cycles: 60 ms.
+/// A jump must show within this time, in cycles: 60 ms.
 const SHOWING: u64 = FREQUENCY * 60 / 1_000;
-/// Robots tried: the boards of each started at other times, so their rarer work meets in another
-/// way.
+/// Number of robots. Their boards start at different times, so their rarer work coincides in
+/// different ways.
 const ROBOTS: u64 = 3;
-/// Phases tried with each. Their distance has no common divisor with any period of the boards.
+/// Phases for each robot. Their distance has no common divisor with any period of the boards.
 const PHASES: u64 = 140;
 const PHASE: u64 = 16_139;
 /// Phases are spread over this many cycles: longer than a pass of the sensor board at 9600 Bd.
 const SPREAD: u64 = 400_000;
-/// Phases tried about the sensor board's status, whose pass is its longest, and comes twice a
-/// second only.
+/// Phases around the sensor board's status. Its pass is the board's longest, and comes only twice a
+/// second.
 const STATUS_PHASES: u64 = 10;
 const STATUS_PERIOD: u64 = FREQUENCY / 2;
-/// From two passes before the next status on, this many cycles apart.
+/// Phases begin two passes before the next status, this many cycles apart.
 const BEFORE_STATUS: u64 = 16_000;
 const STATUS_PHASE: u64 = 1_600;
 /// Where the robot stands on its first edge, and how far the tape jumps, in mm.
 const PLACE: f64 = 60.0;
 const JUMP: f64 = 14.0;
-/// How often a trial is looked at.
+/// How often a trial is checked.
 const SLICE: Duration = Duration::from_millis(1);
-/// How long the interrupts are watched while the robot drives.
+/// How long interrupts are measured while the robot drives.
 const DRIVE: Duration = Duration::from_secs(2);
 
-/// Why nothing was measured.
+/// Why a measurement failed.
 #[derive(Debug, Error)]
 pub enum MeasureError {
     /// The rig cannot be built.
@@ -63,29 +63,29 @@ pub enum MeasureError {
         "the {0:?} board did not shake hands; is it the image of that board, and its baud rate --baud?"
     )]
     NotUp(Board),
-    /// A jump of the tape was not answered.
-    #[error("{0} did not come within 60 ms of their time; are these images that follow a line?")]
+    /// Nothing reacted to a jump of the tape, or no status came.
+    #[error("{0} did not come within 60 ms; can these images follow a line?")]
     NoAnswer(&'static str),
-    /// No robot's duties stood still before a jump.
-    #[error("the duties never stood still on a straight line; look at the regulator's gains")]
+    /// The duties of every robot changed just before every jump.
+    #[error("the duties changed all the time on a straight line; check the regulator's gains")]
     NeverSettled,
 }
 
-/// Times in cycles of 62.5 ns over all phases.
+/// Times over all phases, in cycles of 62.5 ns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Span {
     /// The shortest.
     pub best: u64,
     /// The middle one.
     pub median: u64,
-    /// What 99 of 100 keep.
+    /// 99 % of the times are at most this long.
     pub p99: u64,
     /// The longest: the worst phase.
     pub worst: u64,
 }
 
 impl Span {
-    /// `None` of no times.
+    /// `None` if there are no times.
     fn of(mut cycles: Vec<u64>) -> Option<Self> {
         cycles.sort_unstable();
         let last = cycles.len().checked_sub(1)?;
@@ -98,10 +98,10 @@ impl Span {
     }
 }
 
-/// One board while the robot drives.
+/// Figures of one board while the robot drives.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BoardFigures {
-    /// Bytes of flash the image fills.
+    /// How many bytes of flash the image fills.
     pub flash_bytes: usize,
     /// The longest time from an interrupt's flag to its first instruction, in cycles.
     pub worst_interrupt_latency: u64,
@@ -113,7 +113,7 @@ pub struct BoardFigures {
     pub interrupts: InterruptStatistics,
 }
 
-/// Everything measured.
+/// All figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The chips' clock.
@@ -122,28 +122,28 @@ pub struct Figures {
     pub baud: u32,
     /// The version of rustc that built the sensor board's image.
     pub rustc: String,
-    /// Phases of the sensor board's loop tried.
+    /// How many phases of the sensor board's loop were measured.
     pub phases: u64,
-    /// From the tape's jump to the write of another duty. The pin follows at the end of the PWM
-    /// period under way.
+    /// From the tape's jump to the write of another duty. The pin follows at the end of the running
+    /// PWM period.
     pub tape_to_duty: Span,
     /// One PWM period, in cycles.
     pub pwm_period: u64,
-    /// From the tape's jump to the first start bit of the packet that tells.
+    /// From the tape's jump to the first start bit of the packet that reports it.
     pub tape_to_uart: Span,
     /// The sensor board.
     pub sensor: BoardFigures,
     /// The steering board.
     pub steering: BoardFigures,
-    /// Chip time in processor time while the robot drove: how fast a core of its own runs both
+    /// Chip time divided by processor time while the robot drove: how fast one core runs both
     /// boards. Depends on the machine.
     pub real_time_factor: f64,
 }
 
-/// Measures two images.
+/// Measures the pair of images.
 ///
 /// # Errors
-/// The rig cannot be built, or the images do not do what is measured.
+/// The rig cannot be built, or the images do not do what this measures.
 pub fn measure(images: &Images, options: &RigOptions) -> Result<Figures, MeasureError> {
     let (mut to_duty, mut to_uart) = (Vec::new(), Vec::new());
     for robot in 1..ROBOTS {
@@ -227,7 +227,7 @@ impl Bench {
         Ok(bench)
     }
 
-    /// Adds the times of all phases.
+    /// Measures all phases and adds their times.
     fn jumps(
         &mut self,
         to_duty: &mut Vec<u64>,
@@ -261,7 +261,8 @@ impl Bench {
         Ok(())
     }
 
-    /// The tape jumps now: cycles until the duty changes and until a packet tells.
+    /// Lets the tape jump now. Returns the cycles until a duty changes and until a packet reports
+    /// it.
     fn jump(&mut self) -> Result<(u64, u64), MeasureError> {
         let jump = self.rig.cycle();
         let (mut to_duty, mut to_uart) = (None, None);
@@ -282,14 +283,14 @@ impl Bench {
             }
         }
         Err(MeasureError::NoAnswer(if to_duty.is_none() {
-            "the motors"
+            "another duty"
         } else {
-            "the line packets"
+            "a line packet"
         }))
     }
 
-    /// When the sensor board will tell a status, by the latest one: half a second after `after` or
-    /// later.
+    /// When the sensor board will send a status, at least half a second after `after`, counted from
+    /// its latest one.
     fn next_status(&mut self, after: u64) -> Result<u64, MeasureError> {
         self.sensor.packets.clear();
         self.run_until(self.rig.cycle() + STATUS_PERIOD + SHOWING);
@@ -297,14 +298,14 @@ impl Bench {
             let is_status = matches!(arrived.packet.payload, Payload::BoardStatus(_));
             is_status.then_some(arrived.from)
         });
-        let mut next = latest.ok_or(MeasureError::NoAnswer("the board status"))?;
+        let mut next = latest.ok_or(MeasureError::NoAnswer("a board status"))?;
         while next < after + STATUS_PERIOD {
             next += STATUS_PERIOD;
         }
         Ok(next)
     }
 
-    /// Drives along the line with a clean slate; the real-time factor.
+    /// Drives along the line with cleared figures. Returns the real-time factor.
     fn drive(&mut self) -> f64 {
         self.place(0.0);
         for board in Board::BOTH {
@@ -317,7 +318,7 @@ impl Bench {
         DRIVE.as_secs_f64() / (processor_time() - start).as_secs_f64()
     }
 
-    /// The robot stands on its first edge, this far left of the line.
+    /// Puts the robot on its first edge, this far to the left of the line, in mm.
     fn place(&mut self, left: f64) {
         let pose = Pose {
             x: PLACE,

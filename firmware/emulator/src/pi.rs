@@ -1,6 +1,6 @@
-//! A scripted Pi: the host's end of one line, in chip time.
+//! A scripted Pi: the host's end of the line to one board, in chip time.
 //!
-//! The bridge's own link machines (`lager_wire::link`) without the bridge, for tests and
+//! It uses the bridge's link machines (`lager_wire::link`) without the bridge, for tests and
 //! measurements.
 
 use core::time::Duration;
@@ -11,9 +11,9 @@ use lager_wire::{Command, PACKET_LENGTH, Packet, Payload, SteerCommand, SteerDat
 
 use crate::rig::{Board, Rig, nanoseconds};
 
-/// How often the Pi looks, in cycles: 100 microseconds.
+/// How often the Pi reads its line, in cycles: 100 microseconds.
 const LOOK: u64 = 1_600;
-/// How often a setpoint is renewed, as the bridge does.
+/// How often a setpoint is renewed, the same as in the bridge.
 const RENEWAL: Duration = Duration::from_millis(40);
 
 /// The Pi's end of the line to one board.
@@ -24,9 +24,9 @@ pub struct Pi {
     transmitter: HostTransmitter,
     /// Packets, oldest first.
     pub packets: Vec<Arrived>,
-    /// The times the board came up.
+    /// When the board connected, and how.
     pub ups: Vec<(u64, Up)>,
-    /// When the latest bytes arrived, as many as a packet has.
+    /// Arrival times of the latest bytes, as many as a packet has.
     bytes: VecDeque<u64>,
     seq: u8,
     standing: Option<(SteerCommand, Duration)>,
@@ -58,29 +58,29 @@ impl Pi {
         }
     }
 
-    /// Whether the board is up.
+    /// Whether the board is connected.
     pub fn is_up(&self) -> bool {
         self.link.is_up()
     }
 
-    /// How the link is doing.
+    /// The counters of the link.
     pub fn health(&self) -> LinkCounters {
         self.link.health()
     }
 
-    /// Sends a packet now, if the board is up.
+    /// Sends a packet now, if the board is connected.
     pub fn send(&mut self, rig: &mut Rig, payload: Payload) {
         if let Some(bytes) = self.transmitter.encode(payload) {
             rig.write(self.board, &bytes);
         }
     }
 
-    /// Orders something under a new number, and renews it until told otherwise; the number.
+    /// Gives an order under a new number and renews it until the next order. Returns the number.
     pub fn order(&mut self, rig: &mut Rig, command: Command) -> u8 {
         self.order_code(rig, command.code())
     }
 
-    /// The same with any code.
+    /// As `order`, with any code.
     pub fn order_code(&mut self, rig: &mut Rig, code: u8) -> u8 {
         self.seq = self.seq.wrapping_add(1);
         let seq = self.seq;
@@ -90,7 +90,7 @@ impl Pi {
         seq
     }
 
-    /// Sends nothing any more until the next order.
+    /// Sends nothing more until the next order.
     pub fn fall_silent(&mut self) {
         self.standing = None;
     }
@@ -106,7 +106,7 @@ impl Pi {
             })
     }
 
-    /// Takes in what has arrived and sends what is due.
+    /// Reads the bytes that have arrived and sends the packets that are due.
     fn look(&mut self, rig: &mut Rig) {
         for (cycle, byte) in rig.read(self.board) {
             if self.bytes.len() == PACKET_LENGTH {
@@ -158,7 +158,7 @@ impl Pi {
     }
 }
 
-/// Runs a rig with its Pis to a cycle.
+/// Runs a rig and its Pis to a cycle.
 pub fn run_until(rig: &mut Rig, pis: &mut [&mut Pi], target: u64) {
     while rig.cycle() < target {
         let next = (rig.cycle() + LOOK).min(target);
@@ -169,7 +169,7 @@ pub fn run_until(rig: &mut Rig, pis: &mut [&mut Pi], target: u64) {
     }
 }
 
-/// Runs a rig with its Pis for a time.
+/// Runs a rig and its Pis for a time.
 pub fn run_for(rig: &mut Rig, pis: &mut [&mut Pi], time: Duration) {
     let target = rig.cycle() + crate::rig::cycles(time);
     run_until(rig, pis, target);

@@ -1,4 +1,4 @@
-//! The emulator as a process: ptys, pace, clock page, truth lines.
+//! Runs the emulator as a process: it serves two ptys, keeps pace, and writes clock page and truth.
 //!
 //! ```text
 //!          as far as real time times the speed allows, half a millisecond at a time
@@ -8,11 +8,10 @@
 //!                          |--> a line of truth, 50 times a second and when goods change state
 //!                          '<-- a place, when somebody takes the robot up and puts it there
 //! ```
-//! Where the machine is too slow, the chips' time falls behind and is not made up for: whoever
-//! follows the page sees a slow robot, not a jumpy one.
+//! On a machine that is too slow the chips' time falls behind and does not catch up, so a process
+//! that follows the page sees a slow robot and not a jumpy one.
 //!
-//! Safe state: a dead emulator has no motors. The steering board of a restarted one starts with
-//! them off.
+//! Safe state: without the emulator no motor turns, and a restarted one starts with motors off.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -20,6 +19,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
+use lager_plant::{Hand, Report, WorldState};
 use lager_pty::{Port, PtyError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
@@ -27,45 +27,44 @@ use thiserror::Error;
 use crate::clock::{ClockError, ClockPage, monotonic_ns};
 use crate::eeprom::{EepromError, EepromFile};
 use crate::rig::{Board, Images, Rig, RigError, RigOptions};
-use crate::truth::{Hand, TruthLine};
 
-/// The most chip time between two looks at the ports.
+/// The most chip time between two reads of the ports.
 const SLICE: Duration = Duration::from_micros(500);
-/// The least that is worth waking up for, in real time.
+/// Shorter sleeps are left out, in real time.
 const SHORTEST_SLEEP: Duration = Duration::from_micros(200);
-/// Behind by more than this, the pace is given up and starts anew, in real time.
+/// If the chips are behind by more than this, in real time, the pace starts again from now.
 const GIVE_UP: Duration = Duration::from_millis(20);
-/// From one truth to the next, in chip time.
+/// Time between two lines of truth, in chip time.
 const TRUTH_PERIOD: Duration = Duration::from_millis(20);
 
-/// Both boards have sent their first bytes by then, in chip time: they start up for 65 ms.
+/// Both boards have sent their first bytes by then, in chip time: their start-up takes 65 ms.
 const FIRST_BYTES: Duration = Duration::from_millis(100);
 
-/// From one look at the EEPROMs to the next, in chip time.
+/// Time between two checks of the EEPROMs, in chip time.
 const EEPROM_PERIOD: Duration = Duration::from_millis(100);
 
-/// What the process needs to know.
+/// Options of the process.
 #[derive(Debug)]
 pub struct EmulatorConfig {
-    /// World, seed, baud rate.
+    /// Warehouse, seed and baud rate.
     pub rig: RigOptions,
     /// Where the sensor board's port is linked.
     pub sensor_link: PathBuf,
     /// Where the steering board's port is linked.
     pub steering_link: PathBuf,
-    /// Chip time in real time; more than the machine can do means as fast as it can.
+    /// Chip time divided by real time; more than the machine can do means as fast as it can.
     pub speed: f64,
-    /// The clock page, if one is wanted.
+    /// The file of the clock page, if there is to be one.
     pub clock: Option<PathBuf>,
-    /// The folder in which the boards' EEPROMs are kept, if they are.
+    /// The folder of the boards' EEPROM files, if they are to be kept.
     pub eeprom: Option<PathBuf>,
-    /// Whether lines of truth are written to standard output.
+    /// Whether the emulator writes lines of truth to standard output.
     pub truth: bool,
     /// The world to go on with.
-    pub resume: Option<TruthLine>,
-    /// So many things come and go on the edges.
+    pub resume: Option<WorldState>,
+    /// How many things appear on edges at random, and disappear.
     pub obstacles: u32,
-    /// What somebody's hands do while it runs.
+    /// A person's actions while it runs: moving the robot, putting or taking a thing.
     pub hands: Option<Receiver<Hand>>,
 }
 
@@ -90,15 +89,15 @@ pub enum RunError {
         board.name()
     )]
     Baud {
-        /// Whose image.
+        /// The board of this image.
         board: Board,
-        /// How fast it sends.
+        /// The rate at which it sends, in baud.
         found: u32,
-        /// How fast it should.
+        /// The rate that the port has, in baud.
         wanted: u32,
     },
-    /// No reader takes the truth.
-    #[error("the truth cannot be written to standard output: {0}; leave --truth away")]
+    /// Nobody reads standard output.
+    #[error("cannot write the truth to standard output: {0}; read it, or start without --truth")]
     Truth(#[source] io::Error),
 }
 
@@ -115,8 +114,8 @@ pub fn run(
     rig.world_mut()
         .scatter_obstacles(config.obstacles, config.rig.seed)
         .map_err(RigError::from)?;
-    if let Some(truth) = &config.resume {
-        rig.resume(&truth.world_state());
+    if let Some(world) = &config.resume {
+        rig.resume(world);
     }
     let mut eeproms = Vec::new();
     for board in Board::BOTH {
@@ -125,7 +124,7 @@ pub fn run(
             eeproms.push((board, EepromFile::load(&path, rig.chip(board))?));
         }
     }
-    // Nobody follows the clock yet, so wrong images end the start, and not a robot that runs.
+    // No service follows the clock yet, so a wrong image stops the start and not a running robot.
     rig.run_for(FIRST_BYTES);
     check_baud(&rig, config.rig.baud)?;
     let ports = [
@@ -134,7 +133,7 @@ pub fn run(
     ];
     let clock = config.clock.as_deref().map(ClockPage::open).transpose()?;
     let mut shell = Shell {
-        pace: Pace::new(config.speed),
+        pace: Allowance::new(config.speed),
         rig,
         baud: config.rig.baud,
         ports,
@@ -153,15 +152,15 @@ pub fn run(
     Ok(())
 }
 
-/// How far the chips may go.
+/// How far the chips may run.
 #[derive(Debug)]
-struct Pace {
+struct Allowance {
     speed: f64,
     real_start: u64,
     chip_start: Duration,
 }
 
-impl Pace {
+impl Allowance {
     fn new(speed: f64) -> Self {
         Self {
             speed,
@@ -170,7 +169,7 @@ impl Pace {
         }
     }
 
-    /// Chip time that is due beyond `chip`, given up when it is too much.
+    /// The chip time that is due beyond `chip`; starts the pace again if it is too much.
     fn due(&mut self, chip: Duration, real: u64) -> Duration {
         let elapsed = Duration::from_nanos(real.saturating_sub(self.real_start));
         let wanted = self.chip_start + elapsed.mul_f64(self.speed);
@@ -183,14 +182,14 @@ impl Pace {
         due
     }
 
-    /// How long a span of chip time should last.
+    /// How long a span of chip time should take in real time.
     fn real(&self, chip: Duration) -> Duration {
         chip.div_f64(self.speed)
     }
 }
 
 struct Shell {
-    pace: Pace,
+    pace: Allowance,
     rig: Rig,
     baud: u32,
     ports: [Port; 2],
@@ -236,7 +235,7 @@ impl Shell {
         Ok(())
     }
 
-    /// What the Pi has written goes on its way.
+    /// Hands the Pi's bytes to the boards.
     fn listen(&mut self) {
         for board in Board::BOTH {
             let port = &mut self.ports[board as usize];
@@ -247,16 +246,16 @@ impl Shell {
         }
     }
 
-    /// Does what somebody's hands do, and says what became of it.
+    /// Carries out a person's actions and reports the result of each.
     fn obey_hands(&mut self) -> Result<(), RunError> {
         for hand in self.hands.iter().flat_map(Receiver::try_iter) {
-            let told = hand.act(&mut self.rig.world_mut());
-            write_line(&told)?;
+            let hand = hand.act(&mut self.rig.world_mut());
+            write_line(&Report::Hand(hand))?;
         }
         Ok(())
     }
 
-    /// What has arrived at the Pi's end is handed over.
+    /// Hands the boards' bytes to the Pi.
     fn speak(&mut self) -> Result<(), RunError> {
         check_baud(&self.rig, self.baud)?;
         for board in Board::BOTH {
@@ -265,7 +264,7 @@ impl Shell {
             self.bytes.extend(arrived.iter().map(|(_, byte)| byte));
             self.ports[board as usize].write(&self.bytes);
         }
-        // Nobody here asks for them.
+        // Recorded for measurements, which do not run here.
         self.rig.take_motor_changes();
         Ok(())
     }
@@ -281,11 +280,11 @@ impl Shell {
         }
         self.changes_told = changes;
         self.truth_due = now + TRUTH_PERIOD;
-        write_line(&TruthLine::of(&self.rig))
+        write_line(&Report::Truth(self.rig.truth()))
     }
 
-    /// Sleeps for `time`, or until somebody writes to an open port. A closed one cannot be waited
-    /// on: it is always ready, with an error.
+    /// Sleeps for `time`, or until somebody writes to an open port. A closed port would end the
+    /// sleep at once, because it is always ready with an error.
     fn sleep(&self, time: Duration) {
         let mut fds = Vec::with_capacity(2);
         for port in self.ports.iter().filter(|port| port.is_open()) {
@@ -295,12 +294,12 @@ impl Shell {
             tv_sec: time.as_secs() as i64,
             tv_nsec: i64::from(time.subsec_nanos()),
         };
-        // An interrupted sleep is only a shorter one.
+        // An interrupted sleep is only shorter.
         let _ = poll(&mut fds, Some(&time));
     }
 }
 
-/// Whether both boards send at the rate of the Pi's end, as far as they have sent.
+/// Checks that both boards send at the rate of the Pi's end, if they have sent.
 fn check_baud(rig: &Rig, wanted: u32) -> Result<(), RunError> {
     for board in Board::BOTH {
         if let Some(found) = rig.foreign_baud(board) {
@@ -315,7 +314,7 @@ fn check_baud(rig: &Rig, wanted: u32) -> Result<(), RunError> {
 }
 
 /// Writes a line of JSON to standard output.
-fn write_line(line: &impl serde::Serialize) -> Result<(), RunError> {
+fn write_line(line: &Report) -> Result<(), RunError> {
     let mut out = io::stdout().lock();
     serde_json::to_writer(&mut out, line)
         .map_err(io::Error::from)
@@ -330,7 +329,7 @@ mod tests {
 
     #[test]
     fn a_machine_that_keeps_up_runs_as_far_as_real_time_goes() {
-        let mut pace = Pace::new(2.0);
+        let mut pace = Allowance::new(2.0);
         let start = pace.real_start;
         assert_eq!(pace.due(Duration::ZERO, start), Duration::ZERO);
         let millisecond = start + 1_000_000;
@@ -342,7 +341,7 @@ mod tests {
 
     #[test]
     fn what_a_slow_machine_has_missed_is_not_made_up_for() {
-        let mut pace = Pace::new(1.0);
+        let mut pace = Allowance::new(1.0);
         let late = pace.real_start + 50_000_000;
         let chip = Duration::from_millis(10);
         assert_eq!(pace.due(chip, late), SLICE);

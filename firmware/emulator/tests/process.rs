@@ -14,19 +14,19 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_emulator::truth::TruthLine;
+use lager_plant::{Report, Snapshot};
 use lager_wire::{Callsign, Payload, ResetCause, SteerCommand, WheelCommand};
 use rustix::process::{Pid, Signal, kill_process};
 
 use host::Host;
 
-/// What must happen happens before this, or the test fails instead of hanging.
+/// A test fails after this time, so that it cannot hang.
 const WATCHDOG: Duration = Duration::from_secs(120);
 
-/// A folder of the test's own.
-struct Place(PathBuf);
+/// A folder for one test.
+struct Folder(PathBuf);
 
-impl Place {
+impl Folder {
     fn new() -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
@@ -80,7 +80,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Folder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
@@ -98,15 +98,22 @@ impl Emulator {
         line
     }
 
-    fn truth(&mut self) -> TruthLine {
-        let line = self.line();
-        serde_json::from_str(&line).expect("a line of truth")
+    fn truth(&mut self) -> Snapshot {
+        truth(&self.line())
     }
 
     fn signal(&mut self, signal: Signal) -> Option<i32> {
         let id = Pid::from_child(&self.child);
         kill_process(id, signal).expect("it runs");
         self.child.wait().expect("it ends").code()
+    }
+}
+
+/// The truth in a line.
+fn truth(line: &str) -> Snapshot {
+    match serde_json::from_str(line).expect("a line") {
+        Report::Truth(truth) => truth,
+        Report::Hand(_) => panic!("no hands have done anything: {line}"),
     }
 }
 
@@ -117,7 +124,7 @@ impl Drop for Emulator {
     }
 }
 
-/// Answers the board until `wanted` of a packet.
+/// Answers the board until a packet comes that `wanted` accepts.
 fn until(board: &mut Host, wanted: impl Fn(&Payload) -> bool) {
     let (start, mut came) = (Instant::now(), false);
     while !came {
@@ -134,7 +141,7 @@ fn port(path: &Path) -> Host {
 
 #[test]
 fn the_boards_answer_on_their_ports_and_drive_on_command() {
-    let place = Place::new();
+    let place = Folder::new();
     let mut emulator = place.start(None);
     let mut steering = port(&place.at("steering"));
     until(&mut steering, |payload| {
@@ -146,7 +153,7 @@ fn the_boards_answer_on_their_ports_and_drive_on_command() {
     until(&mut sensor, |payload| matches!(payload, Payload::Line(_)));
 
     let before = emulator.truth();
-    assert_eq!((before.left_duty, before.right_duty), (0, 0));
+    assert_eq!(before.duties, [0, 0]);
     let code = lager_wire::Command::Wheel(WheelCommand::ManualForward).code();
     let command = Payload::SteerCommand(SteerCommand { code, seq: 1 });
     let start = Instant::now();
@@ -158,8 +165,8 @@ fn the_boards_answer_on_their_ports_and_drive_on_command() {
     order();
     loop {
         let truth = emulator.truth();
-        // The board allows for the battery: what the driver is given is not just the standard duty.
-        if truth.left_duty > 60 && truth.x_mm > before.x_mm + 1.0 {
+        // The board corrects for the battery, so the driver's duty is not exactly the standard one.
+        if truth.duties[0] > 60 && truth.world.pose.x > before.world.pose.x + 1.0 {
             break;
         }
         if ordered.elapsed() > Duration::from_millis(20) {
@@ -168,15 +175,15 @@ fn the_boards_answer_on_their_ports_and_drive_on_command() {
         }
         assert!(start.elapsed() < WATCHDOG, "it never moves");
     }
-    // Nobody renews: the steering board stops by itself, in chip time.
-    while emulator.truth().left_duty != 0 {}
+    // The test does not renew the command: the steering board stops by itself, in chip time.
+    while emulator.truth().duties[0] != 0 {}
 
     let first = place.chip_ns();
     let truth = emulator.truth();
     while place.chip_ns() <= first {
         assert!(start.elapsed() < WATCHDOG, "the clock stands");
     }
-    assert!(truth.time_ns > before.time_ns);
+    assert!(truth.world.time > before.world.time);
     assert_eq!(emulator.signal(Signal::TERM), Some(0));
     assert!(!place.at("steering").is_symlink(), "the links are gone");
     assert_eq!(
@@ -187,7 +194,7 @@ fn the_boards_answer_on_their_ports_and_drive_on_command() {
 
 #[test]
 fn a_killed_emulator_goes_on_where_it_was() {
-    let place = Place::new();
+    let place = Folder::new();
     let mut emulator = place.start(None);
     let mut line = String::new();
     let start = Instant::now();
@@ -196,16 +203,14 @@ fn a_killed_emulator_goes_on_where_it_was() {
         assert!(start.elapsed() < WATCHDOG, "the clock stands");
     }
     emulator.signal(Signal::KILL);
-    let (kept, clock): (TruthLine, u64) = (
-        serde_json::from_str(&line).expect("a line"),
-        place.chip_ns(),
-    );
+    let (kept, clock) = (truth(&line).world, place.chip_ns());
 
+    let line = serde_json::to_string(&kept).expect("JSON") + "\n";
     let mut emulator = place.start(Some(&line));
     let mut steering = port(&place.at("steering"));
-    let first = emulator.truth();
-    assert!(first.time_ns >= kept.time_ns);
-    assert!((first.x_mm - kept.x_mm).abs() < 1.0);
+    let first = emulator.truth().world;
+    assert!(first.time >= kept.time);
+    assert!((first.pose.x - kept.pose.x).abs() < 1.0);
     assert_eq!(first.goods, kept.goods);
     assert!(place.chip_ns() >= clock, "the clock never goes back");
     until(&mut steering, |payload| {
@@ -216,7 +221,7 @@ fn a_killed_emulator_goes_on_where_it_was() {
 
 #[test]
 fn what_is_wrong_is_said_in_a_sentence() {
-    let place = Place::new();
+    let place = Folder::new();
     let run = |sensor: &Path, warehouse: &str| {
         let output = Command::new(env!("CARGO_BIN_EXE_lager-emulator"))
             .args(["--steering-elf", "/dev/null", "--warehouse", warehouse])
@@ -231,6 +236,8 @@ fn what_is_wrong_is_said_in_a_sentence() {
         assert_eq!(output.status.code(), Some(1));
         String::from_utf8(output.stderr).expect("it is text")
     };
+    let unknown = run(&place.at("nothing.elf"), "smal");
+    assert!(unknown.contains("small, curved, large"), "{unknown}");
     let missing = run(&place.at("nothing.elf"), "small");
     assert!(missing.contains("firmware/avr/build"), "{missing}");
     fs::write(place.at("hex"), ":10000000").expect("there is room");

@@ -1,4 +1,4 @@
-//! The receiver's end: sampled bits in, words out.
+//! The receiver: turns sampled bits into words.
 //!
 //! ```text
 //!              a pulse               silence: answer
@@ -12,23 +12,23 @@
 //!                                an error, counted                                   '- counted
 //! ```
 //!
-//! Return sync is the only thing the receiver ever sends (X7): for the first pulse it meets and for
-//! a pulse that stands alone, which is how a restarted sender asks again. It knows no clock: a
-//! timer that every pulse restarts tells it of the silence.
+//! The receiver sends nothing but return sync (X7): after the first pulse of all, and after a
+//! single pulse, by which a restarted sender asks again. It reads no clock: a timer, which every
+//! pulse restarts, reports the silence.
 
 use crate::{Timing, WORD_BITS};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Alignment {
     Unanswered,
-    /// Somewhere in a sender's stream, waiting for a silence.
+    /// In the middle of a sender's pulses, waiting for a silence.
     Unaligned,
     Aligned,
-    /// A word was released; before the next silence no pulse belongs to a word.
+    /// A word is complete; until the next silence any pulse is an error.
     Complete,
 }
 
-/// The register when no bit of a word has come.
+/// The register before the first bit of a word.
 const NO_BITS: u16 = 1;
 
 /// Collects sampled bits into words.
@@ -36,21 +36,21 @@ const NO_BITS: u16 = 1;
 pub struct Receiver {
     bits: u8,
     alignment: Alignment,
-    /// The shift register of the original (X8), first bit highest, and above it a mark: a bit that
-    /// is set and tells, by its place, how many bits have come.
+    /// The original's shift register (X8), first bit highest. Above the bits stands a mark: a set
+    /// bit whose position tells how many bits have come.
     register: u16,
     answer: bool,
     errors: u8,
 }
 
 impl Receiver {
-    /// A receiver of words of [`WORD_BITS`] bits that has met no sender yet.
+    /// A receiver of words of [`WORD_BITS`] bits that has heard no sender yet.
     #[must_use]
     pub const fn new() -> Self {
         Self::with_bits(WORD_BITS)
     }
 
-    /// The same for words of `bits` bits, 1..=15.
+    /// A receiver of words of `bits` bits, 1..=15.
     #[must_use]
     pub const fn with_bits(bits: u8) -> Self {
         assert!(1 <= bits && bits <= 15);
@@ -63,8 +63,8 @@ impl Receiver {
         }
     }
 
-    /// Sync rose with this level on data, `since_us` after the rise before; what it is after a
-    /// silence does not matter. The last bit of a word brings the word.
+    /// Sync rose while data had this level, `since_us` after the rise before; after a silence
+    /// `since_us` may be anything. Returns a word with its last bit.
     #[inline(always)]
     pub fn on_sync(&mut self, data: bool, since_us: u16) -> Option<u16> {
         match self.alignment {
@@ -88,8 +88,8 @@ impl Receiver {
         }
     }
 
-    /// No pulse has come for [`Timing::idle_us`]; told once after the last pulse. Whether to send
-    /// one pulse on return sync now.
+    /// No pulse has come for [`Timing::idle_us`]; to be called once after the last pulse. Returns
+    /// whether to send one pulse on return sync now.
     #[must_use = "the sender waits for its answer"]
     pub fn on_silence(&mut self) -> bool {
         match self.alignment {
@@ -105,19 +105,19 @@ impl Receiver {
         core::mem::take(&mut self.answer)
     }
 
-    /// Whether a sender has been met.
+    /// Whether a sender was heard.
     #[must_use]
     pub fn is_answered(&self) -> bool {
         self.alignment != Alignment::Unanswered
     }
 
-    /// Whether some bits of a word have come and others are still to come.
+    /// Whether a word is half received.
     #[must_use]
     pub fn is_midway(&self) -> bool {
         self.register != NO_BITS
     }
 
-    /// Words lost to missing pulses, and disturbing pulses; stays at 255.
+    /// Words lost to missing pulses plus disturbing pulses; stays at 255.
     #[must_use]
     pub fn errors(&self) -> u8 {
         self.errors
@@ -138,7 +138,7 @@ impl Receiver {
 
     #[inline(always)]
     fn count_error(&mut self) {
-        // In the interrupt, so no value is computed that is not stored.
+        // This runs in the interrupt, so it calculates nothing that it does not store.
         if let Some(errors) = self.errors.checked_add(1) {
             self.errors = errors;
         }

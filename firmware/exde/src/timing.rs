@@ -1,27 +1,28 @@
-//! The lengths that sender and receiver must agree on.
+//! The times that sender and receiver must agree on.
 
 /// Times of the bus in microseconds.
 ///
-/// They are lower bounds for the sender: when its timer is served late, everything after it moves
-/// and keeps its order.
+/// The sender waits at least that long: if its timer is served late, all later edges move, in the
+/// same order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timing {
-    /// Half a bit: from data being set to the pulse on sync, and from there to the next bit.
+    /// Half a bit: from a change of data to the pulse on sync, and from the pulse to the next
+    /// change.
     pub half_us: u16,
-    /// Silence the sender keeps after a word; longer than `idle_us`.
+    /// The sender's silence after a word; longer than `idle_us`.
     pub gap_us: u16,
-    /// Silence after which the receiver starts a new word; longer than any pause inside a word.
+    /// After this silence the receiver starts a new word; longer than any pause inside a word.
     pub idle_us: u16,
-    /// From one handshake pulse to the next ("now and then", X6); longer than `gap_us`.
+    /// Time between two handshake pulses ("now and then", X6); longer than `gap_us`.
     pub handshake_us: u16,
-    /// A pulse closer than this to the one before is a disturbance and is not counted as a bit.
+    /// A pulse sooner than this after the last one is a disturbance and not a bit.
     pub shortest_us: u16,
 }
 
 impl Timing {
-    /// 20 microseconds a bit; the chip's interrupts make it somewhat more. Half of it is what the
-    /// receiver's interrupt may be late. A word is sent beside a packet to the Pi, which takes 220
-    /// microseconds too.
+    /// 20 microseconds a bit; the chip's interrupts add a little. The receiver's interrupt may be
+    /// late by half of it. A word takes about as long as a packet to the Pi, 220 microseconds, and
+    /// both are sent at the same time.
     pub const STANDARD: Self = Self {
         half_us: 10,
         gap_us: 80,

@@ -1,4 +1,4 @@
-//! The sender's end: a machine that is advanced by a timer and sets one edge each time.
+//! The sender: a state machine that a timer advances; each step sets one edge.
 //!
 //! ```text
 //!              answered                  start(word)         half          half
@@ -8,16 +8,16 @@
 //!         every handshake_us  '----------- gap <------------ last bit ---------'
 //! ```
 //!
-//! It knows no clock: every step says how long to wait before the next one.
+//! It reads no clock: every step says how long to wait before the next one.
 
 use crate::{Timing, WORD_BITS};
 
-/// A constant, because the sender's interrupt comes twice a bit and has no time to look it up.
+/// A constant, because the sender's interrupt comes twice a bit and must be short.
 const TIMING: Timing = Timing::STANDARD;
 
-/// What to do with the wires now.
+/// An action on the wires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
+pub enum WireAction {
     /// Nothing.
     Nothing,
     /// Set data to this level.
@@ -32,8 +32,8 @@ pub enum Action {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// What to do now.
-    pub action: Action,
-    /// After how many microseconds to call [`Transmitter::advance`]; `None` while ready for a word.
+    pub action: WireAction,
+    /// Call [`Transmitter::advance`] after this many microseconds; `None` while ready for a word.
     pub wait_us: Option<u16>,
 }
 
@@ -46,7 +46,7 @@ enum Phase {
     Gap,
 }
 
-/// The register when only the mark is left.
+/// The register when no bit is left, only the mark.
 const NOTHING_LEFT: u16 = 1 << 15;
 
 /// Sends words bit by bit once the receiver has answered.
@@ -54,21 +54,21 @@ const NOTHING_LEFT: u16 = 1 << 15;
 pub struct Transmitter {
     bits: u8,
     phase: Phase,
-    /// What is left of the word, the next bit highest, and behind the last bit a mark: a bit that
-    /// is set.
+    /// The remaining bits of the word, the next one highest; a set bit behind the last one marks
+    /// the end.
     register: u16,
     answered: bool,
 }
 
 impl Transmitter {
-    /// A sender of words of [`WORD_BITS`] bits that has not yet been answered; to be advanced at
+    /// A sender of words of [`WORD_BITS`] bits that nobody has answered yet. Call `advance` at
     /// once.
     #[must_use]
     pub const fn new() -> Self {
         Self::with_bits(WORD_BITS)
     }
 
-    /// The same for words of `bits` bits, 1..=15.
+    /// A sender of words of `bits` bits, 1..=15.
     #[must_use]
     pub const fn with_bits(bits: u8) -> Self {
         assert!(1 <= bits && bits <= 15);
@@ -80,7 +80,7 @@ impl Transmitter {
         }
     }
 
-    /// The receiver's return sync was seen (X6). Later ones mean nothing.
+    /// Return sync rose (X6): the receiver has answered. Later pulses change nothing.
     pub fn on_return(&mut self) {
         self.answered = true;
     }
@@ -91,7 +91,7 @@ impl Transmitter {
         self.answered
     }
 
-    /// Whether [`Transmitter::start`] would take a word.
+    /// Whether [`Transmitter::start`] accepts a word.
     #[must_use]
     pub fn is_ready(&self) -> bool {
         self.phase == Phase::Ready
@@ -103,7 +103,7 @@ impl Transmitter {
         matches!(self.phase, Phase::Placed | Phase::Pulsed)
     }
 
-    /// Begins to send `word`; `None`, and nothing happens, unless [`Transmitter::is_ready`].
+    /// Begins to send `word`. `None`: nothing happens, because it is not [`Transmitter::is_ready`].
     #[must_use = "the step is to be carried out"]
     pub fn start(&mut self, word: u16) -> Option<Step> {
         if !self.is_ready() {
@@ -113,27 +113,27 @@ impl Transmitter {
         Some(self.place())
     }
 
-    /// The time of the step before is over: the next one.
+    /// The wait of the last step is over: returns the next step.
     #[inline(always)]
     #[must_use = "the step is to be carried out"]
     pub fn advance(&mut self) -> Step {
         match self.phase {
             Phase::Placed => {
                 self.phase = Phase::Pulsed;
-                step(Action::Pulse, TIMING.half_us)
+                step(WireAction::Pulse, TIMING.half_us)
             }
             Phase::Pulsed if self.register != NOTHING_LEFT => self.place(),
             Phase::Pulsed => {
                 self.phase = Phase::Gap;
-                step(Action::Release, TIMING.gap_us)
+                step(WireAction::Release, TIMING.gap_us)
             }
-            // The answer to a pulse is acted on when the next one would be due: after a silence, so
-            // that the first word does not stick to the pulse.
-            Phase::Asking if !self.answered => step(Action::Pulse, TIMING.handshake_us),
+            // An answer takes effect only when the next pulse would be due: after a silence, so
+            // that the receiver does not add the pulse to the first word.
+            Phase::Asking if !self.answered => step(WireAction::Pulse, TIMING.handshake_us),
             Phase::Asking | Phase::Gap | Phase::Ready => {
                 self.phase = Phase::Ready;
                 Step {
-                    action: Action::Nothing,
+                    action: WireAction::Nothing,
                     wait_us: None,
                 }
             }
@@ -145,7 +145,7 @@ impl Transmitter {
         self.phase = Phase::Placed;
         let bit = self.register & 1 << 15 != 0;
         self.register <<= 1;
-        step(Action::Place(bit), TIMING.half_us)
+        step(WireAction::Place(bit), TIMING.half_us)
     }
 }
 
@@ -156,7 +156,7 @@ impl Default for Transmitter {
 }
 
 #[inline(always)]
-const fn step(action: Action, wait_us: u16) -> Step {
+const fn step(action: WireAction, wait_us: u16) -> Step {
     Step {
         action,
         wait_us: Some(wait_us),

@@ -1,8 +1,8 @@
-//! Sender and receiver on three wires, driven by their timers in virtual time.
+//! Sender and receiver on three wires; timers drive them in virtual time.
 
-use lager_exde::{Action, Receiver, Step, Timing, Transmitter, WORD_BITS};
+use lager_exde::{Receiver, Step, Timing, Transmitter, WORD_BITS, WireAction};
 
-/// Both ends with their timers and the wires between them, and everything that was on the wires.
+/// Both ends, their timers, the wires between them, and a record of the wires.
 struct Bus {
     now_us: u32,
     sender: Transmitter,
@@ -11,15 +11,15 @@ struct Bus {
     silence_due_us: Option<u32>,
     last_pulse_us: u32,
     data: bool,
-    /// Times of the pulses, and the level on data.
+    /// Times of the pulses, and the level of data at each.
     samples: Vec<(u32, bool)>,
     /// Every change of data.
     edges: Vec<(u32, bool)>,
     words: Vec<u16>,
     returns: usize,
-    /// Pulses, counted from now, that the receiver does not get.
+    /// Numbers of future pulses that the receiver does not get.
     lost: Vec<usize>,
-    /// How late each step of the sender is, in turn.
+    /// How late each of the sender's steps is.
     late_us: u32,
 }
 
@@ -51,7 +51,7 @@ impl Bus {
         bus
     }
 
-    /// Lets time pass from timer to timer.
+    /// Lets time pass, from one timer to the next.
     fn run(&mut self, span_us: u32) {
         let end_us = self.now_us + span_us;
         loop {
@@ -79,15 +79,15 @@ impl Bus {
         let wait = |us| self.now_us + u32::from(us) + self.late_us;
         self.sender_due_us = step.wait_us.map(wait);
         match step.action {
-            Action::Nothing => {}
-            Action::Place(_) | Action::Release => {
-                let level = step.action == Action::Place(true);
+            WireAction::Nothing => {}
+            WireAction::Place(_) | WireAction::Release => {
+                let level = step.action == WireAction::Place(true);
                 if level != self.data {
                     self.edges.push((self.now_us, level));
                 }
                 self.data = level;
             }
-            Action::Pulse => {
+            WireAction::Pulse => {
                 let place = self.samples.len();
                 self.samples.push((self.now_us, self.data));
                 if !self.lost.contains(&place) {
@@ -178,7 +178,10 @@ fn the_sender_asks_now_and_then_until_it_is_answered() {
     let mut sender = Transmitter::new();
     for _ in 0..5 {
         let step = sender.advance();
-        assert_eq!((step.action, step.wait_us), (Action::Pulse, Some(20_000)));
+        assert_eq!(
+            (step.action, step.wait_us),
+            (WireAction::Pulse, Some(20_000))
+        );
         assert_eq!(sender.start(0x555), None, "no data before the handshake");
         assert!(!sender.is_up() && !sender.is_sending());
     }
@@ -189,7 +192,7 @@ fn the_sender_asks_now_and_then_until_it_is_answered() {
         "not sticking to the pulse that was answered"
     );
     let step = sender.advance();
-    assert_eq!((step.action, step.wait_us), (Action::Nothing, None));
+    assert_eq!((step.action, step.wait_us), (WireAction::Nothing, None));
     assert!(sender.start(0x555).is_some());
 }
 
@@ -218,7 +221,7 @@ fn a_lost_pulse_costs_one_word() {
     }
 }
 
-/// A receiver that has answered and heard the silence after.
+/// A receiver that has answered a sender and then heard silence.
 fn met() -> Receiver {
     let mut receiver = Receiver::new();
     assert_eq!(receiver.on_sync(false, 0), None);
@@ -236,7 +239,7 @@ fn a_word_is_midway_from_its_first_bit_to_its_last() {
     }
     assert_eq!(receiver.on_sync(true, 20), Some(0x7FF));
     assert!(!receiver.is_midway());
-    // Nor is it when the rest of a word does not come.
+    // It is not midway either when the rest of a word did not come.
     assert!(!receiver.on_silence());
     assert_eq!(receiver.on_sync(true, 100), None);
     assert_eq!(receiver.on_sync(true, 20), None);
@@ -280,7 +283,7 @@ fn a_disturbance_close_to_a_pulse_is_not_a_bit() {
 
 #[test]
 fn the_first_bit_of_a_word_may_come_after_any_time() {
-    // The clock of the board that measures goes round, so after a silence the time means nothing.
+    // The receiving board's clock wraps, so the time after a long silence can be any value.
     for since_us in [0, 3, 20, 0xFFFF] {
         let mut receiver = met();
         let mut word = receiver.on_sync(true, since_us);
@@ -331,7 +334,7 @@ fn a_receiver_restarted_inside_a_word_waits_for_the_next() {
 #[test]
 fn a_sender_served_late_sends_slowly_and_right() {
     let mut bus = Bus::up(WORD_BITS);
-    // Two steps make a bit; 15 us late each they stay inside the receiver's patience.
+    // Two steps make a bit; with 15 us each the bits still come before the receiver's time-out.
     bus.late_us = 15;
     bus.start(0x5A3);
     bus.run(2_000);

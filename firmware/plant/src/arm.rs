@@ -1,4 +1,4 @@
-//! The arm on top of the robot: servo positions in, place and opening of the claw out.
+//! The arm on the robot: calculates the claw's place and opening from the servos' positions.
 //!
 //! ```text
 //!            elbow (4, 5)
@@ -9,9 +9,9 @@
 //!        ==+== base (1), 60 mm ahead              but do not move its middle
 //!    ------+------- axle                8         claw
 //! ```
-//! All servos at 512: upper arm straight up, forearm level and forwards, claw 80 mm open. The
-//! mirrored servo of a pair stands at 1023 minus the position of its partner. Which way a
-//! position counts is a matter of how a servo is mounted and is fixed in the constants below.
+//! With all servos at 512 the upper arm is straight up, the forearm points level ahead, and the
+//! claw is 80 mm open. The mirrored servo of a pair stands at 1023 minus its partner's position.
+//! The direction in which a servo counts depends on its mounting; the constants below fix it.
 
 /// Number of servos (AMB-32).
 pub const SERVOS: usize = 8;
@@ -29,7 +29,7 @@ pub const FOREARM: f64 = 150.0;
 
 /// The middle of every servo's range.
 const CENTRE: f64 = 512.0;
-/// Position of the claw's servo at which the jaws meet, and the opening in mm a unit adds.
+/// Position of the claw's servo at which the jaws meet, and how many mm each further unit opens.
 const CLAW_CLOSED: f64 = 210.0;
 const GAP_PER_UNIT: f64 = 80.0 / 302.0;
 /// Widest opening of the claw in mm.
@@ -48,14 +48,14 @@ pub struct Claw {
     pub gap: f64,
 }
 
-/// Where the claw is when servo n stands at `positions[n - 1]`.
+/// The claw's place when servo n stands at `positions[n - 1]`.
 pub fn claw(positions: &[f64; SERVOS]) -> Claw {
     let angle = |position: f64| (position - CENTRE) * UNIT;
     let pair = |one: f64, mirrored: f64| f64::midpoint(one, 1023.0 - mirrored);
     let base = angle(positions[0]);
     let shoulder = angle(pair(positions[1], positions[2]));
     let elbow = angle(pair(positions[3], positions[4]));
-    // Measured from straight up: rising positions lift the upper arm and stretch the forearm.
+    // Measured from straight up: higher positions lift the upper arm and stretch the forearm.
     let upper = core::f64::consts::FRAC_PI_2 + shoulder;
     let fore = upper - core::f64::consts::FRAC_PI_2 + elbow;
     let reach = UPPER_ARM * upper.cos() + FOREARM * fore.cos();

@@ -8,9 +8,9 @@
 //!   9.0 V |_______________________|
 //!       100 %                     0
 //! ```
-//! The curve is that of a lithium-polymer cell discharged slowly, 4.2 V to 3.0 V, three in series;
-//! the currents are those of a Raspberry Pi with two boards, of two pairs of gear motors and of
-//! eight servos that hold a pose. A robot as drawn has 11.1 V whatever it does.
+//! The curve is that of three lithium-polymer cells in series that are discharged slowly, 4.2 V to
+//! 3.0 V each. The currents are those of a Raspberry Pi with two boards, two pairs of gear motors
+//! and eight servos that hold a pose. A robot as drawn always has 11.1 V.
 
 use crate::make::Make;
 use crate::noise::Noise;
@@ -30,9 +30,9 @@ const AT_REST: [(f64, f64); 8] = [
     (0.9, 12.2),
     (1.0, 12.6),
 ];
-/// What Pi, boards and servos draw in amperes.
+/// Current of the Pi, the boards and the servos in amperes.
 const STANDING: f64 = 1.6;
-/// What a motor draws at the standard duty in amperes.
+/// Current of one motor at the standard duty in amperes.
 const DRIVING: f64 = 0.8;
 
 /// The battery and its charge.
@@ -45,7 +45,7 @@ pub struct Battery {
 }
 
 impl Battery {
-    /// A battery whose charge and resistance come from `noise`.
+    /// A battery; its charge and its resistance come from `noise`.
     pub fn new(mut noise: Noise, make: Make) -> Self {
         let mut battery = Self {
             make,
@@ -57,7 +57,7 @@ impl Battery {
         battery
     }
 
-    /// Lets the robot draw what it draws at these duties for `seconds`.
+    /// Takes the robot's current at these duties from the charge for `seconds`.
     pub fn step(&mut self, seconds: f64, duties: [i16; 2]) {
         if self.make == Make::Nominal {
             return;
@@ -68,17 +68,17 @@ impl Battery {
         self.volts = at_rest(self.charge) - amperes * self.resistance;
     }
 
-    /// Its voltage now.
+    /// The voltage now.
     pub fn volts(&self) -> f64 {
         self.volts
     }
 
-    /// The part of its charge that is left, 0 to 1.
+    /// The part of the charge that is left, 0 to 1.
     pub fn charge(&self) -> f64 {
         self.charge
     }
 
-    /// Puts another charge in its place.
+    /// Sets the charge, 0 to 1.
     pub fn set_charge(&mut self, charge: f64) {
         self.charge = charge.clamp(0.0, 1.0);
         self.step(0.0, [0, 0]);

@@ -1,9 +1,11 @@
-//! The robot's body on the floor: pose, and how two wheel speeds change it.
+//! The robot's pose on the floor, and how the speeds of its wheels change it.
 //!
-//! The pose is that of the middle of the wheels' axle. What stands in the way is not known here
-//! ([`crate::contact`]).
+//! The pose is that of the middle of the wheels' axle. [`crate::contact`] knows about obstacles;
+//! this module does not.
 
 use core::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
 
 /// Effective distance between the wheel tracks in mm. Together with [`crate::motor::CRUISE`] it
 /// gives 360 degrees in 12 s at the standard duty (W4).
@@ -13,8 +15,8 @@ pub const LINE_SENSOR_AHEAD: f64 = 160.0;
 /// How far the IR ranger is ahead of the axle, in mm (P4).
 pub const IR_AHEAD: f64 = 100.0;
 
-/// Where the robot stands and looks.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Position and heading of the robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Middle of the axle, in mm.
     pub x: f64,
@@ -25,7 +27,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The point `ahead` mm before the axle and `left` mm to the left.
+    /// The point `ahead` mm in front of the axle and `left` mm to the left.
     pub fn point(&self, ahead: f64, left: f64) -> (f64, f64) {
         let (sin, cos) = self.heading.sin_cos();
         (
@@ -34,9 +36,10 @@ impl Pose {
         )
     }
 
-    /// The pose after both wheels ran at these speeds in mm/s for `seconds`.
+    /// The pose after both wheels have run at these speeds in mm/s for `seconds`.
     ///
-    /// The chord has the heading of the middle of the step, which is exact to the third order.
+    /// It moves along a straight line with the heading of the middle of the step, which is exact to
+    /// the third order.
     #[must_use]
     pub fn moved(&self, left: f64, right: f64, seconds: f64) -> Self {
         let turned = (right - left) / TRACK * seconds;

@@ -1,9 +1,11 @@
-//! The warehouses that come with the robot, from small to large.
+//! The built-in warehouses, from small to large.
 //!
-//! Product 1 of `small` is near; `curved` and `large` have exits that bend, one at the tightest
-//! radius there is.
+//! In `small`, product 1 is near. The exits of `curved` and `large` bend, that of `large` at the
+//! smallest allowed radius.
 
-use crate::warehouse::{Curve, Exit, Floor, Product, Side, Warehouse};
+use lager_floor::{Heading, Node};
+
+use crate::warehouse::{Curve, Exit, Floor, NamedProduct, Warehouse};
 
 impl Warehouse {
     /// The names of the built-in warehouses; the first is the default.
@@ -21,14 +23,14 @@ impl Warehouse {
 
     fn small() -> Self {
         Self {
-            size: [2, 2],
+            size: Node::new(2, 2),
             side_length_cm: 50,
-            delivery: [0, 0],
+            delivery: Node::new(0, 0),
             exit: Exit::default(),
             products: vec![
-                product(1, [1, 0], Side::Down),
-                product(2, [0, 1], Side::Up),
-                product(3, [1, 1], Side::Left),
+                product(1, Node::new(1, 0), Heading::Down),
+                product(2, Node::new(0, 1), Heading::Up),
+                product(3, Node::new(1, 1), Heading::Left),
             ],
             floor: Floor::default(),
             obstacles: Vec::new(),
@@ -37,19 +39,19 @@ impl Warehouse {
 
     fn curved() -> Self {
         Self {
-            size: [3, 2],
+            size: Node::new(3, 2),
             side_length_cm: 60,
-            delivery: [3, 0],
+            delivery: Node::new(3, 0),
             exit: Exit {
                 length_cm: 130,
                 curve: Curve::S,
                 radius_cm: 40,
             },
             products: vec![
-                product(1, [1, 0], Side::Up),
-                product(2, [0, 1], Side::Left),
-                product(3, [2, 1], Side::Right),
-                product(4, [2, 0], Side::Left),
+                product(1, Node::new(1, 0), Heading::Up),
+                product(2, Node::new(0, 1), Heading::Left),
+                product(3, Node::new(2, 1), Heading::Right),
+                product(4, Node::new(2, 0), Heading::Left),
             ],
             floor: Floor::default(),
             obstacles: Vec::new(),
@@ -58,21 +60,21 @@ impl Warehouse {
 
     fn large() -> Self {
         Self {
-            size: [5, 4],
+            size: Node::new(5, 4),
             side_length_cm: 50,
-            delivery: [0, 4],
+            delivery: Node::new(0, 4),
             exit: Exit {
                 length_cm: 110,
                 curve: Curve::Right,
                 radius_cm: 25,
             },
             products: vec![
-                product(1, [2, 2], Side::Down),
-                product(2, [4, 0], Side::Right),
-                product(3, [0, 0], Side::Down),
-                product(4, [4, 3], Side::Up),
-                product(5, [1, 1], Side::Left),
-                product(6, [3, 1], Side::Up),
+                product(1, Node::new(2, 2), Heading::Down),
+                product(2, Node::new(4, 0), Heading::Right),
+                product(3, Node::new(0, 0), Heading::Down),
+                product(4, Node::new(4, 3), Heading::Up),
+                product(5, Node::new(1, 1), Heading::Left),
+                product(6, Node::new(3, 1), Heading::Up),
             ],
             floor: Floor::default(),
             obstacles: Vec::new(),
@@ -80,8 +82,8 @@ impl Warehouse {
     }
 }
 
-fn product(id: i32, square: [u8; 2], side: Side) -> Product {
-    Product {
+fn product(id: i32, square: Node, side: Heading) -> NamedProduct {
+    NamedProduct {
         id,
         name: None,
         square,
@@ -98,7 +100,7 @@ mod tests {
         for name in Warehouse::BUILTIN {
             let warehouse = Warehouse::builtin(name).expect("listed");
             assert_eq!(warehouse.validate(), Ok(()), "{name}");
-            assert!(warehouse.map_products().any(|(id, ..)| id == 1));
+            assert!(warehouse.products.iter().any(|product| product.id == 1));
         }
         assert!(Warehouse::builtin("huge").is_none());
     }

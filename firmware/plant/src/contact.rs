@@ -1,5 +1,5 @@
-//! The robot's body against what stands in the hall: it stops at a shelf, an obstacle or a wall,
-//! and pushes goods that lie on the floor before it.
+//! Contact of the robot's body: a shelf, an obstacle or a wall stops it, and it pushes goods that
+//! lie on the floor in front of it.
 //!
 //! ```text
 //!            .-----------------------.
@@ -8,9 +8,9 @@
 //!            |                       |
 //!            '-----------------------'
 //! ```
-//! A touch is one collision until the body has been free for half a second. Wheels that are held
-//! go on turning and skid. The arm and what it holds touch nothing; goods that are pushed pass
-//! through each other and through shelves.
+//! A touch counts as one collision until the body has been free for half a second. The wheels of a
+//! stopped robot go on turning and skid. The arm and the goods that it holds touch nothing. Goods
+//! that the robot pushes pass through each other and through shelves.
 
 use crate::body::Pose;
 use crate::goods::{FLOOR_HEIGHT, Good, GoodState, SIDE};
@@ -25,10 +25,10 @@ pub const HALF_WIDTH: f64 = 90.0;
 
 /// How long the body must be free before the next touch counts, in ns.
 const APART_NS: u64 = 500_000_000;
-/// Half a diagonal of the body: what is farther away cannot touch it.
+/// More than half a diagonal of the body, in mm: a thing farther away cannot touch it.
 const RADIUS: f64 = 200.0;
 
-/// What has been touched.
+/// The last free pose, and the collisions so far.
 #[derive(Clone, Debug)]
 pub(crate) struct Contact {
     free: Pose,
@@ -45,23 +45,23 @@ impl Contact {
         }
     }
 
-    /// How often the body has run into something.
+    /// How often the body has hit something.
     pub(crate) fn collisions(&self) -> u32 {
         self.collisions
     }
 
-    /// Goes on with a kept count.
+    /// Sets the count, from a kept world.
     pub(crate) fn set_collisions(&mut self, collisions: u32) {
         self.collisions = collisions;
     }
 
-    /// The robot was put somewhere.
+    /// Somebody has put the robot here.
     pub(crate) fn place(&mut self, pose: Pose) {
         self.free = pose;
     }
 
-    /// Where the body really gets to when it wants to be at `wanted`. Goods in its way are pushed;
-    /// whether any were.
+    /// Returns the pose that the body reaches when it wants to reach `wanted`, and whether it
+    /// pushed goods on the way.
     pub(crate) fn resolve(
         &mut self,
         wanted: Pose,
@@ -69,7 +69,7 @@ impl Contact {
         goods: &mut [Good],
         now_ns: u64,
     ) -> (Pose, bool) {
-        // A robot that was put into a shelf may leave it.
+        // A robot that somebody put into a shelf can leave it.
         let held = blocks.iter().any(|block| {
             let depth = overlap(&wanted, block).map(depth);
             depth.is_some_and(|depth| {
@@ -104,7 +104,7 @@ fn depth(way: [f64; 2]) -> f64 {
     way[0].hypot(way[1])
 }
 
-/// The shortest way on which a block leaves the body, if it is in it.
+/// The shortest way by which a block would leave the body, if it is inside.
 fn overlap(pose: &Pose, block: &Block) -> Option<[f64; 2]> {
     let half = [
         (block.high[0] - block.low[0]) / 2.0,
@@ -120,7 +120,7 @@ fn overlap(pose: &Pose, block: &Block) -> Option<[f64; 2]> {
     let (sin, cos) = pose.heading.sin_cos();
     let middle = (FRONT - REAR) / 2.0;
     let (long, wide) = ((FRONT + REAR) / 2.0, HALF_WIDTH);
-    // From the middle of the body to the middle of the block.
+    // The way from the middle of the body to the middle of the block.
     let (x, y) = (x - middle * cos, y - middle * sin);
     let mut least = None;
     let mut shortest = f64::MAX;
@@ -175,7 +175,7 @@ mod tests {
         let pose = drive(&mut contact, &mut [], &[shelf()], 400);
         assert_eq!(pose.x, 460.0 - FRONT);
         assert_eq!(contact.collisions(), 1);
-        // Away, and back again.
+        // The robot moves away and comes back.
         let away = at(200.0, 0.0, 0.0);
         contact.resolve(away, &[shelf()], &mut [], 20_000_000_000);
         drive(&mut contact, &mut [], &[shelf()], 0);

@@ -1,4 +1,4 @@
-//! The exit line with its bar, as strips and arcs of tape (E3, E4).
+//! The exit line with its bar, made of strips and arcs of tape (E3, E4).
 //!
 //! ```text
 //!   node --- strip ---.                       straight: one strip
@@ -20,16 +20,16 @@ pub const WIDTH: f64 = 15.0;
 pub const BAR: f64 = 300.0;
 /// Half the width of the tape.
 pub(crate) const HALF: f64 = WIDTH / 2.0;
-/// Farther away than any spot is wide.
+/// A distance, in mm, that is larger than any spot.
 pub(crate) const FAR: f64 = 1.0e6;
 
 /// Pieces overlap by this much in mm, so that no seam shows between them.
 const OVERLAP: f64 = 5.0;
 
-/// Sensors that have run past the end of a strip by this much, in mm, are still beside it.
+/// A robot is beside a strip until its sensors are this far past the end, in mm.
 const BEYOND: f64 = 100.0;
-/// Who follows a piece looks along it within 45 degrees: on a bend the sensors are ahead of the
-/// axle.
+/// A robot follows a piece if its heading is within 45 degrees of it: on a bend the sensors are
+/// ahead of the axle.
 const ALONG: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
 /// One piece of the exit line, or the bar.
@@ -91,7 +91,7 @@ impl Piece {
         }
     }
 
-    /// What the distance is at least; quicker.
+    /// A lower limit of the distance, quicker to calculate.
     pub(crate) fn at_least(&self, x: f64, y: f64) -> f64 {
         match *self {
             Self::Strip { .. } => self.distance(x, y),
@@ -101,8 +101,8 @@ impl Piece {
         }
     }
 
-    /// How far a point is from the middle of the tape, if it is along the piece and the heading is
-    /// too.
+    /// Distance from a point to the middle of the tape; `None` unless the point and the heading are
+    /// along the piece.
     pub(crate) fn beside(&self, x: f64, y: f64, heading: f64) -> Option<f64> {
         let is_along = |tangent: f64| (heading - tangent).cos().abs() > ALONG;
         match *self {
@@ -126,7 +126,7 @@ impl Piece {
         }
     }
 
-    /// Points that the piece lies between.
+    /// Points around the piece, for a box that contains it.
     pub(crate) fn outline(&self) -> [(f64, f64); 3] {
         match *self {
             Self::Strip { start, length, .. } => {
@@ -147,7 +147,7 @@ impl Piece {
     }
 }
 
-/// The exit line with its bar, and the middle of the bar.
+/// Builds the exit line with its bar. Also returns the middle of the bar.
 pub(crate) fn exit(warehouse: &Warehouse) -> (Vec<Piece>, Pose) {
     let (x, y) = node(warehouse.delivery, side_mm(warehouse));
     let heading = if warehouse.starts_towards_plus_x() {
@@ -191,7 +191,7 @@ pub(crate) fn exit(warehouse: &Warehouse) -> (Vec<Piece>, Pose) {
     (pieces, at)
 }
 
-/// A curve by `turn` rad, positive to the left, and the pose at its end.
+/// A curve by `turn` rad, positive to the left; also returns the pose at its end.
 fn bend(at: Pose, radius: f64, turn: f64) -> (Piece, Pose) {
     let side = turn.signum();
     let (cx, cy) = at.point(0.0, side * radius);

@@ -1,4 +1,4 @@
-//! The goods: on a shelf, in the claw, on the floor, delivered (E7).
+//! The goods: each piece is on a shelf, in the claw, on the floor or delivered (E7).
 //!
 //! ```text
 //!             claw closes around it
@@ -6,9 +6,11 @@
 //!     ^                                | ^                           |
 //!     '-- claw opens over its shelf ---' '--- claw closes around it -'
 //! ```
-//! Goods are cubes that do not touch each other; the claw takes at most one. Held by an edge,
-//! with the claw's middle more than 25 mm from the goods', they slip out after some seconds, as if
-//! the claw had been opened; how many the seed says.
+//! Goods are cubes that do not touch each other; the claw takes at most one. If the claw's middle
+//! is more than 25 mm from theirs, it holds them by an edge, and they slip out after some seconds
+//! as if it had opened. The seed decides how many.
+
+use serde::{Deserialize, Serialize};
 
 use crate::arm::Claw;
 use crate::body::Pose;
@@ -22,19 +24,19 @@ use crate::warehouse::Warehouse;
 pub const SIDE: f64 = 50.0;
 /// Height of the middle of goods on the floor, in mm.
 pub const FLOOR_HEIGHT: f64 = SIDE / 2.0;
-/// How far the claw's middle may be from the goods' to take them, in mm along the floor.
+/// Greatest distance from the claw's middle to goods that it can take, in mm along the floor.
 pub const REACH: f64 = 40.0;
-/// How far the claw's middle may be above or below the goods' to take them, in mm.
+/// Greatest difference of their heights, in mm.
 pub const REACH_UP: f64 = 30.0;
-/// How far the claw's middle may be from the goods' for a firm grip, in mm along the floor.
+/// Greatest distance from the claw's middle to the goods' for a firm grip, in mm along the floor.
 pub const FIRM: f64 = 25.0;
-/// How long a bad grip holds, in s.
+/// How long a bad grip holds, at least and at most, in s.
 const SLIPS_AFTER: [f64; 2] = [1.0, 6.0];
-/// How much wider than the goods the claw must open to let go, in mm.
+/// The claw lets go when it opens this much wider than the goods, in mm.
 const PLAY: f64 = 4.0;
 
-/// Where a piece of goods is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The place of a piece of goods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum GoodState {
     /// On its shelf.
     Shelf,
@@ -47,13 +49,13 @@ pub enum GoodState {
 }
 
 /// One piece of goods.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Good {
     /// The product's number.
     pub id: i32,
     /// Its middle: x, y and height in mm.
     pub position: [f64; 3],
-    /// Where it is.
+    /// The kind of place where it is.
     pub state: GoodState,
 }
 
@@ -63,9 +65,9 @@ pub struct Goods {
     list: Vec<Good>,
     stands: Vec<[f64; 3]>,
     held: Option<usize>,
-    /// How long the grip will still hold, in s; for ever if it is firm.
+    /// How long the grip will hold, in s; infinite for a firm grip.
     grip: f64,
-    /// How long a bad one holds.
+    /// How long a bad grip holds, in s.
     slips_after: f64,
     slips: u32,
     last_gap: f64,
@@ -73,7 +75,7 @@ pub struct Goods {
 }
 
 impl Goods {
-    /// Every product's goods on its shelf; how long a bad grip holds comes from `noise`.
+    /// All goods on their shelves; `noise` decides how long a bad grip holds.
     pub fn new(warehouse: &Warehouse, mut noise: Noise, make: Make) -> Self {
         let side = crate::scene::side_mm(warehouse);
         let stands: Vec<_> = warehouse
@@ -113,22 +115,22 @@ impl Goods {
         self.held.map(|index| self.list[index].id)
     }
 
-    /// Counts the changes of any state; who publishes the goods looks here.
+    /// Counts all changes of states, so that a publisher of the goods does not miss one.
     pub fn changes(&self) -> u64 {
         self.changes
     }
 
-    /// How often goods have slipped out of the claw.
+    /// How often goods have slipped from the claw.
     pub fn slips(&self) -> u32 {
         self.slips
     }
 
-    /// The goods, for whatever pushes those on the floor.
+    /// The goods, for the code that pushes them on the floor.
     pub(crate) fn list_mut(&mut self) -> &mut [Good] {
         &mut self.list
     }
 
-    /// Goods on the floor were pushed: they count as delivered where they lie now, or no longer.
+    /// Goods on the floor were pushed: checks again which of them are delivered.
     pub(crate) fn pushed(&mut self, tape: &Tape) {
         for good in &mut self.list {
             if matches!(good.state, GoodState::Lying | GoodState::Delivered) {
@@ -138,7 +140,7 @@ impl Goods {
         self.changes += 1;
     }
 
-    /// Takes up the goods of a kept world: those whose number is known here.
+    /// Takes over the goods of a kept world, if this warehouse has their number.
     pub fn restore(&mut self, kept: &[Good]) {
         for good in kept {
             if let Some(mine) = self.list.iter_mut().find(|mine| mine.id == good.id) {
@@ -152,7 +154,7 @@ impl Goods {
         self.changes += 1;
     }
 
-    /// How narrow the jaws can get now, in mm.
+    /// The smallest gap of the jaws now, in mm.
     pub fn narrowest(&self) -> f64 {
         if self.held.is_some() { SIDE } else { 0.0 }
     }
@@ -340,7 +342,7 @@ mod tests {
 
     #[test]
     fn the_arm_reaches_goods_on_their_shelf_and_the_floor_at_the_bar() {
-        // 250 mm ahead of the axle at the height of goods on a shelf, and a pose to drop from.
+        // 250 mm ahead of the axle at the height of goods on a shelf, and a pose for dropping them.
         let pose = |shoulder: f64, elbow: f64| {
             let (up, low) = (512.0 + shoulder, 511.0 - shoulder);
             let (out, back) = (512.0 + elbow, 511.0 - elbow);

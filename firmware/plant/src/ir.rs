@@ -1,8 +1,8 @@
-//! The IR ranger at the front, a Sharp GP2Y0A21 (AMB-14): distance in, ADC value out.
+//! The IR ranger at the front, a Sharp GP2Y0A21 (AMB-14): turns distances into ADC values.
 //!
-//! It measures about every 38 ms and holds its output in between. Below 10 cm the output folds
-//! back: the voltage falls again although the object comes nearer. Rangers differ within the
-//! datasheet's limits: in the output at 80 cm, in what it rises by until 10 cm, and in their pace.
+//! It measures about every 38 ms and holds its output in between. Below 10 cm the voltage falls
+//! again although the object comes nearer. Rangers differ within the datasheet's limits: in the
+//! output at 80 cm, in its rise from there to 10 cm, and in the time between measurements.
 //!
 //! ```text
 //!  3.1 V  _
@@ -20,13 +20,12 @@ use crate::scene::Block;
 /// Time between two measurements in ns (datasheet: 38.3 ms typical, 28.7 to 47.9).
 pub const CYCLE_NS: u64 = 38_300_000;
 const CYCLES_MS: [f64; 2] = [28.7, 47.9];
-/// Output at 80 cm of any ranger, in volts (datasheet: 0.25 to 0.55).
+/// Lowest and highest output at 80 cm, in volts (datasheet).
 const AT_80: [f64; 2] = [0.25, 0.55];
-/// Output at 10 cm less that at 80 cm, in volts (datasheet: 1.65 to 2.15).
+/// Least and greatest difference of the outputs at 10 cm and at 80 cm, in volts (datasheet).
 const SPAN: [f64; 2] = [1.65, 2.15];
 
-/// Output over distance in (cm, volt) from 10 cm on: figure 2 of the datasheet E4-A00201EN,
-/// white paper.
+/// Output from 10 cm on, as (cm, volt): figure 2 of the datasheet E4-A00201EN, white paper.
 const FAR_FIELD: [(f64, f64); 10] = [
     (10.0, 2.305),
     (15.0, 1.645),
@@ -39,7 +38,7 @@ const FAR_FIELD: [(f64, f64); 10] = [
     (70.0, 0.443),
     (80.0, 0.415),
 ];
-/// The folded part below 10 cm, of the same figure.
+/// The part below 10 cm, from the same figure.
 const NEAR_FIELD: [(f64, f64); 9] = [
     (0.0, 0.0),
     (0.98, 0.469),
@@ -51,21 +50,21 @@ const NEAR_FIELD: [(f64, f64); 9] = [
     (5.85, 3.137),
     (10.0, 2.305),
 ];
-/// Output when nothing is in view, in volts.
+/// Output without any object, in volts.
 const NOTHING: f64 = 0.15;
-/// How far the beam reaches at all, in mm.
+/// Range of the beam, in mm.
 const REACH: f64 = 2_000.0;
-/// Angles of the rays that stand for the beam, in rad.
+/// Angles of the rays that together stand for the beam, in rad.
 const BEAM: [f64; 3] = [-0.04, 0.0, 0.04];
-/// Deviation of a measurement in volts, and the largest gain error of a sensor.
+/// Deviation of a measurement in volts, and the greatest gain error of a sensor.
 const NOISE: f64 = 0.008;
 const GAIN_ERROR: f64 = 0.02;
 
-/// The ranger and the output it holds.
+/// The ranger, which holds its last output.
 #[derive(Clone, Debug)]
 pub struct IrRanger {
     gain: f64,
-    /// Added after the gain.
+    /// Added after the gain, in volts.
     offset: f64,
     cycle_ns: u64,
     volts: f64,
@@ -74,8 +73,7 @@ pub struct IrRanger {
 }
 
 impl IrRanger {
-    /// A ranger whose deviation and noise come from `noise`. Its first measurement is due at
-    /// once.
+    /// A ranger with deviations from `noise`. Its first measurement is due at once.
     pub fn new(mut noise: Noise, make: Make) -> Self {
         let drawn = [FAR_FIELD[0].1, FAR_FIELD[FAR_FIELD.len() - 1].1];
         let typical = drawn[0] - drawn[1];
@@ -99,7 +97,7 @@ impl IrRanger {
         }
     }
 
-    /// Measures if a measurement is due.
+    /// Makes a measurement if one is due.
     pub fn step(&mut self, now_ns: u64, pose: &Pose, blocks: &[Block]) {
         if now_ns < self.next_ns {
             return;
@@ -112,7 +110,7 @@ impl IrRanger {
         self.volts = clean + self.noise.bell(NOISE);
     }
 
-    /// The output as a 10-bit conversion at 5 V.
+    /// The output as read by a 10-bit ADC at 5 V.
     pub fn adc(&self) -> u16 {
         (self.volts / 5.0 * 1023.0).clamp(0.0, 1023.0) as u16
     }
@@ -132,13 +130,13 @@ pub fn distance(pose: &Pose, blocks: &[Block]) -> Option<f64> {
         .filter(|distance| *distance < REACH)
 }
 
-/// The output in volts for something `cm` away.
+/// The output in volts for an object at `cm`.
 pub fn volts(cm: f64) -> f64 {
     let last = FAR_FIELD[FAR_FIELD.len() - 1];
     if cm < 10.0 {
         between(&NEAR_FIELD, cm.max(0.0), |cm| cm)
     } else if cm < last.0 {
-        // The curve is nearly straight over the reciprocal of the distance.
+        // The voltage is nearly linear in the inverse of the distance.
         between(&FAR_FIELD, cm, |cm| 1.0 / cm)
     } else {
         (last.1 * last.0 / cm).max(NOTHING)
@@ -154,7 +152,7 @@ fn between(table: &[(f64, f64)], cm: f64, scale: impl Fn(f64) -> f64) -> f64 {
     a.1 + (b.1 - a.1) * part
 }
 
-/// Where a ray enters a block: 0 if it starts inside.
+/// Distance at which a ray enters a block; 0 if it starts inside.
 fn hit(from: (f64, f64), direction: (f64, f64), block: &Block) -> Option<f64> {
     let (mut enter, mut leave) = (0.0_f64, f64::MAX);
     for (origin, step, low, high) in [
@@ -176,6 +174,8 @@ fn hit(from: (f64, f64), direction: (f64, f64), block: &Block) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use lager_floor::Node;
+
     use super::*;
     use crate::scene::blocks;
     use crate::{Obstacle, Warehouse};
@@ -183,7 +183,7 @@ mod tests {
     fn blocked() -> Vec<Block> {
         let mut warehouse = Warehouse::builtin("small").unwrap();
         warehouse.obstacles.push(Obstacle {
-            between: [[1, 0], [2, 0]],
+            between: [Node::new(1, 0), Node::new(2, 0)],
         });
         blocks(&warehouse)
     }

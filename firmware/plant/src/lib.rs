@@ -1,11 +1,10 @@
-//! What the boards are wired to: warehouse, tape, sensors, motors, servos.
+//! The world that the boards are wired to: warehouse, tape, sensors, motors, servos, goods.
 //!
-//! It is apart from the simulator, because an emulator that runs the real firmware images is wired
-//! to the very same world. [`World`] puts the parts together; each part has its own module and can
-//! be used alone.
+//! It is a crate of its own because the simulator and the emulator of the real images both use it.
+//! [`World`] puts the parts together; each part has its own module and can be used alone.
 //!
-//! Everything here is pure: time is advanced by the caller, noise comes from a seed, nothing
-//! reads a clock or does I/O. Nothing here knows packets, topics or decisions of the boards.
+//! Everything here is pure: the caller advances time, noise comes from a seed, and nothing reads a
+//! clock or does I/O. Nothing here knows packets, topics or the boards' decisions.
 //!
 //! Coordinates are millimetres with node (0, 0) at the origin, x to the right and y up
 //! (AMB-36); headings are radians, counter-clockwise from +x.
@@ -22,6 +21,7 @@ pub mod arm;
 pub mod battery;
 pub mod body;
 mod builtin;
+mod by_hand;
 pub mod contact;
 mod exit;
 pub mod goods;
@@ -41,10 +41,11 @@ pub mod weave;
 mod world;
 
 pub use body::Pose;
+pub use by_hand::{Hand, Report};
 pub use goods::{Good, GoodState};
 pub use make::Make;
 pub use obstacles::{HandsOff, MOST_OBSTACLES, Standing};
 pub use servo::ServoFault;
 pub use validate::WarehouseError;
-pub use warehouse::{Curve, Edge, Exit, Floor, Obstacle, Product, Side, Warehouse};
-pub use world::{World, WorldState};
+pub use warehouse::{Curve, Exit, Floor, NamedProduct, Obstacle, Warehouse};
+pub use world::{Snapshot, World, WorldState};

@@ -6,11 +6,10 @@
 //!                  | 160 mm
 //!        ==========+==========      axle
 //! ```
-//! Black tape reflects little, so its voltage is high (S6). Every spot has its own white and
-//! black level from the seed, and each reading has a little noise. Where the robot is varied
-//! ([`crate::make`]), floor and tape differ from place to place too: the floor is darker and the
-//! tape paler by up to 25 steps, in waves of 0.7 to 3 m. A floor may also have a weaker contrast
-//! altogether ([`crate::warehouse::Floor`]).
+//! Black tape reflects little, so its voltage is high (S6). The seed gives every sensor its own
+//! white and black level, and each reading a little noise. For a varied robot ([`crate::make`]) the
+//! floor is darker and the tape paler in some places, by up to 25 steps, in waves of 0.7 to 3 m. A
+//! floor may also have a weaker contrast everywhere ([`crate::warehouse::Floor`]).
 
 use core::f64::consts::TAU;
 
@@ -24,25 +23,25 @@ use crate::warehouse::Floor;
 pub const CHANNELS: usize = 11;
 /// Distance between neighbouring sensors in mm.
 pub const PITCH: f64 = 7.0;
-/// Radius of the spot one sensor sees, in mm.
+/// Radius of the spot that one sensor sees, in mm.
 pub const SPOT: f64 = 2.5;
 
-/// How far from the middle of the array anything is seen, in mm.
+/// The array sees nothing farther from its middle than this, in mm.
 const REACH: f64 = (CHANNELS - 1) as f64 / 2.0 * PITCH + SPOT;
 
-/// How far a sensor's own levels are from the mean.
+/// How far a sensor's own levels may be from the mean, in steps.
 const LEVEL_SPREAD: f64 = 15.0;
-/// Deviation of one reading.
+/// Deviation of one reading, in steps.
 const READING_NOISE: f64 = 2.0;
-/// How much floor and tape differ from place to place.
+/// How much floor and tape differ between places, in steps.
 const DRIFT: f64 = 25.0;
-/// Wavelengths of that in mm.
+/// Shortest and longest wavelength of these differences, in mm.
 const WAVES: [f64; 2] = [700.0, 3_000.0];
 
-/// How the floor, or the tape, differs from place to place: two waves across each other.
+/// How the floor or the tape differs between places: the sum of a wave along x and one along y.
 #[derive(Clone, Copy, Debug)]
 struct Drift {
-    /// Angle in rad for each mm, and at the origin.
+    /// For each wave: radians per mm, and the angle at the origin.
     waves: [[f64; 2]; 2],
     most: f64,
 }
@@ -62,7 +61,7 @@ impl Drift {
         }
     }
 
-    /// From 0 to the most.
+    /// The difference at a point, from 0 to `most`.
     fn at(&self, x: f64, y: f64) -> f64 {
         if self.most == 0.0 {
             return 0.0;
@@ -73,17 +72,17 @@ impl Drift {
     }
 }
 
-/// What all sensors of a pose have in common: worked out once for each place the robot comes to.
+/// Values that all sensors share at a pose, calculated once for each pose.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct UnderArray {
     pose: Pose,
     /// The middle of the array.
     middle: (f64, f64),
-    /// From one sensor to the next.
+    /// The way from one sensor to the next.
     step: (f64, f64),
-    /// How much the floor is darker here, and the tape paler.
+    /// How much darker the floor and how much paler the tape is here.
     drift: [f64; 2],
-    /// The tape that any of them may see.
+    /// The tape that any of the sensors may see.
     near: Near,
 }
 
@@ -92,17 +91,17 @@ struct Place {
 pub struct LineSensor {
     white: [f64; CHANNELS],
     black: [f64; CHANNELS],
-    /// Of the floor and of the tape.
+    /// The differences of the floor and those of the tape.
     drifts: [Drift; 2],
-    place: Option<Place>,
+    place: Option<UnderArray>,
     noise: Noise,
 }
 
 impl LineSensor {
-    /// An array over this floor, whose levels and noise come from `noise`.
+    /// An array over this floor, with levels and noise from `noise`.
     pub fn new(mut noise: Noise, make: Make, floor: Floor) -> Self {
         let [white, black] = [floor.white, floor.tape].map(f64::from);
-        // On a floor of weak contrast everything differs less.
+        // On a floor of weak contrast all differences are smaller.
         let part = (black - white) / Floor::default().contrast();
         let mut levels =
             |mean: f64| core::array::from_fn(|_| mean + noise.spread(LEVEL_SPREAD * part));
@@ -117,14 +116,14 @@ impl LineSensor {
         }
     }
 
-    /// One conversion: 8 bits, high over tape. A channel that is not there reads 0, as an input
+    /// One conversion: 8 bits, high over tape. A channel that does not exist reads 0, like an input
     /// of the multiplexer that is tied to ground.
     pub fn read(&mut self, channel: u8, pose: &Pose, tape: &Tape) -> u8 {
         let channel = usize::from(channel);
         if channel >= CHANNELS {
             return 0;
         }
-        let Place {
+        let UnderArray {
             middle,
             step,
             drift,
@@ -140,13 +139,13 @@ impl LineSensor {
         (level + self.noise.bell(READING_NOISE)).clamp(0.0, 255.0) as u8
     }
 
-    fn place_at(&mut self, pose: &Pose, tape: &Tape) -> Place {
+    fn place_at(&mut self, pose: &Pose, tape: &Tape) -> UnderArray {
         if let Some(place) = self.place.filter(|place| place.pose == *pose) {
             return place;
         }
         let middle = pose.point(LINE_SENSOR_AHEAD, 0.0);
         let first = pose.point(LINE_SENSOR_AHEAD, PITCH);
-        let place = Place {
+        let place = UnderArray {
             pose: *pose,
             middle,
             step: (first.0 - middle.0, first.1 - middle.1),
@@ -187,9 +186,9 @@ mod tests {
     fn a_mark_reaches_to_one_side_a_crossing_to_both() {
         // Product 1 has its mark to the left at x = 750; the array is 160 mm ahead.
         assert_eq!(bits(750.0 - 160.0, 0.0), 0b111_1111_0000);
-        // The crossing (1, 0) at the lower border: a way up, none down.
+        // The crossing (1, 0) at the lower border has a way up and none down.
         assert_eq!(bits(500.0 - 160.0, 0.0), 0b111_1111_0000);
-        // The crossing (1, 1) inside.
+        // The crossing (1, 1) is inside.
         assert_eq!(bits(500.0 - 160.0, 500.0), 0b111_1111_1111);
     }
 

@@ -1,4 +1,4 @@
-//! How a robot is made: as drawn, or with the deviations that real parts have.
+//! How a robot is made: as drawn, or with the deviations of real parts.
 //!
 //! | part | as drawn | varied, drawn from the seed | source |
 //! |---|---|---|---|
@@ -13,13 +13,14 @@
 //! | sagging of a joint without torque | none | 10 to 80 units/s | assumed for a worn gear |
 //! | slip of a bad grip after | 3 s | 1 to 6 s | assumed |
 //!
-//! The standard duty gives cruising speed whatever the dead band is, because the people who chose
-//! 100 for the duty and 12 s for a turn (W1, W4) measured it with their robot. So the dead band is
-//! the foot of a line through that point, and only the slope differs: a step of duty changes the
-//! speed by a fortieth of cruise with a dead band of 60, and by a tenth with 90.
+//! The standard duty gives cruising speed with any dead band, because the people who chose 100 for
+//! the duty and 12 s for a turn (W1, W4) measured it with their robot. So the line of speed over
+//! duty goes through that point, starts at the dead band, and differs only in slope: one step of
+//! duty changes the speed by a fortieth of cruise if the dead band is 60, and by a tenth if it is
+//! 90.
 //!
-//! The robot learns what its parts are like. The steering board takes the battery out of its duties
-//! and learns at marks how unlike its sides are; logic learns there how fast the wheels are.
+//! The robot learns these deviations. The steering board corrects its duties for the battery, and
+//! learns at marks how much its two motors differ; logic learns there how fast the wheels are.
 //! `Make::Nominal` is the robot as drawn, for exact figures.
 
 use crate::noise::Noise;
@@ -27,15 +28,15 @@ use crate::noise::Noise;
 /// How a robot is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Make {
-    /// As drawn, with little noise: for tests that need exact figures.
+    /// As drawn, with little noise, for tests that need exact figures.
     Nominal,
-    /// As parts come out of the box.
+    /// With the deviations of parts that nobody has selected.
     #[default]
     Varied,
 }
 
 impl Make {
-    /// `drawn` for a robot as drawn, otherwise evenly from `low` to `high`.
+    /// `drawn` for a robot as drawn, otherwise a random value from `low` to `high`.
     pub(crate) fn draw(self, noise: &mut Noise, drawn: f64, low: f64, high: f64) -> f64 {
         match self {
             Self::Nominal => drawn,

@@ -1,4 +1,4 @@
-//! One motor driver with its wheel pair: duty and battery in, wheel speed out.
+//! One motor driver with its wheel pair: turns duty and battery voltage into wheel speed.
 //!
 //! ```text
 //!  speed
@@ -8,15 +8,15 @@
 //!       dead band
 //! ```
 //!
-//! Each motor of each seed has its own gain, its own dead band ([`crate::make`] has the ranges)
-//! and a slowly wandering disturbance, so the robot does not drive straight by itself, as the
-//! real one does not (W6).
+//! The seed gives each motor its own gain, its own dead band ([`crate::make`] has the ranges) and a
+//! slowly changing disturbance, so the robot does not drive straight by itself; nor does the real
+//! one (W6).
 //!
-//! **Why a dead band**, as drawn of 75 of 255: with the document's gains of 2/2 a linear motor
-//! cannot follow the 25 cm curve of E3. Full error then gives ±20 duty, and a radius of about 60
-//! cm. With the dead band the same gains reach 175 mm and settle within one square without weaving:
-//! from 20 mm beside the line the largest error is 4.9 mm after 250 mm, 1.2 mm after 500 mm and 0.5
-//! mm after a metre (8 seeds, both sides).
+//! **Why a dead band**, 75 of 255 as drawn: with the document's gains of 2/2 a motor without one
+//! cannot follow the 25 cm curve of E3. Full error then gives ±20 duty and a radius of about 60 cm.
+//! With the dead band the same gains reach 175 mm, and settle within one square without weaving: a
+//! robot that starts 20 mm beside the line is at most 4.9 mm off after 250 mm, 1.2 mm after 500 mm
+//! and 0.5 mm after a metre (8 seeds, both sides).
 
 use crate::battery;
 use crate::make::Make;
@@ -31,10 +31,10 @@ pub const STANDARD_DUTY: f64 = 100.0;
 pub const DEAD_BAND: f64 = 75.0;
 /// Time constant of the speed in s.
 pub const LAG: f64 = 0.09;
-/// Largest gain error of a motor as drawn, and of any.
+/// Greatest gain error of a motor as drawn, and of a varied one.
 const GAIN_ERROR: f64 = 0.03;
 const LARGEST_GAIN_ERROR: f64 = 0.10;
-/// Where the dead band of a motor lies.
+/// Lowest and highest dead band of a varied motor.
 const DEAD_BANDS: [f64; 2] = [60.0, 90.0];
 
 /// Time constant of the wandering disturbance in s.
@@ -79,14 +79,14 @@ impl Motor {
         self.set_supply(battery::NOMINAL);
     }
 
-    /// Sets the voltage that the duty is a part of.
+    /// Sets the supply voltage, of which the duty is a part.
     pub fn set_supply(&mut self, volts: f64) {
         let duty = self.duty.abs() * volts / battery::NOMINAL;
         let effective = (duty - self.dead_band).max(0.0) / (STANDARD_DUTY - self.dead_band);
         self.target = (effective * CRUISE * self.gain).copysign(self.duty);
     }
 
-    /// Advances by `seconds`, which is short against the lag.
+    /// Advances by `seconds`, which must be much shorter than the lag.
     pub fn step(&mut self, seconds: f64) {
         if self.target == 0.0 && self.speed == 0.0 {
             return;
@@ -105,7 +105,7 @@ impl Motor {
         self.speed
     }
 
-    /// Takes up a speed, as when a kept world is resumed.
+    /// Sets the speed in mm/s, from a kept world.
     pub fn set_speed(&mut self, speed: f64) {
         self.speed = speed;
     }

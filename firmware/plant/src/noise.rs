@@ -1,9 +1,9 @@
 //! Seeded noise: the same seed gives the same disturbances, run after run.
 //!
-//! A generator of our own (SplitMix64, the public-domain mixing function of Steele, Lea and Flood),
-//! so that a seed in a report still means the same robot after a dependency was updated. Every
-//! device draws from its own stream: reading one device more often does not change what another one
-//! sees. Never use it where chance must not be guessed.
+//! The generator (SplitMix64, the public-domain mixing function of Steele, Lea and Flood) stands
+//! here, so that a seed in a report still means the same robot after an update of a dependency.
+//! Every device has its own stream: reading one device more often does not change another one's
+//! values. Do not use it where nobody may guess the numbers.
 
 /// One stream of noise.
 #[derive(Clone, Debug)]
@@ -15,7 +15,7 @@ pub struct Noise {
 const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
 impl Noise {
-    /// The stream number `stream` of `seed`. Streams of one seed are independent of each other.
+    /// Stream number `stream` of `seed`. Streams of one seed are independent of each other.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut noise = Self {
             state: seed ^ stream.wrapping_mul(0xD1B5_4A32_D192_ED03),
@@ -39,8 +39,8 @@ impl Noise {
         (2.0 * unit - 1.0) * range
     }
 
-    /// Bell-shaped around 0 with the standard deviation `sigma`, bounded by 3.5 `sigma`: the sum
-    /// of four even 16-bit numbers, because one draw then serves a whole sample.
+    /// Bell-shaped around 0 with the standard deviation `sigma`, at most 3.5 `sigma`: the sum of
+    /// four even 16-bit numbers, because one draw then gives a whole value.
     pub fn bell(&mut self, sigma: f64) -> f64 {
         let bits = self.bits();
         let sum = (bits & 0xFFFF) + (bits >> 16 & 0xFFFF) + (bits >> 32 & 0xFFFF) + (bits >> 48);

@@ -1,69 +1,59 @@
 //! The things on the edges: those of the warehouse's file, those that people put and take, and
-//! those that come and go at random. A random thing stands in the middle of an edge for a while,
-//! then nowhere for a while. No thing is put where the robot is.
+//! random ones. A random thing stands in the middle of an edge for a while, then nowhere for a
+//! while. No thing appears where the robot is.
 //!
-//! It only changes the list of things in the hall. It does not decide who sees a thing or runs into
-//! it.
+//! This module only changes the list of things in the hall. Other modules decide whether the ranger
+//! sees a thing and whether the robot runs into it.
 
-use thiserror::Error;
+use lager_floor::{Edge, Heading, Node};
+use serde::{Deserialize, Serialize};
 
 use crate::body::Pose;
 use crate::noise::Noise;
 use crate::room;
 use crate::scene::{self, Block};
-use crate::warehouse::{Edge, Warehouse};
+use crate::warehouse::Warehouse;
 
-/// The first of the streams of noise, one for each thing.
+/// Number of the first noise stream; each thing has one.
 const STREAM: u64 = 1_000;
-/// Nobody puts a thing whose middle would be nearer to the robot's axle than this, in mm: the robot
-/// must be able to turn round before it.
+/// A thing cannot be put nearer to the robot's axle than this, in mm, measured to the thing's
+/// middle: the robot must be able to turn round in front of it.
 const APART: f64 = 320.0;
-/// For how long a thing stands, at least, and how much longer at most, in s.
+/// A random thing stands for the first number of seconds and for up to the second one longer.
 const STANDS: [u64; 2] = [30, 60];
-/// For how long it is away.
+/// It is away for the first number of seconds and for up to the second one longer.
 const AWAY: [u64; 2] = [5, 25];
-/// How often a place is looked for where there was none, in ns.
+/// If no place was found, the next search comes after this time, in ns.
 const RETRY_NS: u64 = 500_000_000;
 
-/// So many things may stand in a warehouse at once.
+/// The most things that may stand in a warehouse at once.
 pub const MOST_OBSTACLES: usize = 64;
 
 /// A thing that stands on an edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Standing {
-    /// Where.
+    /// The edge.
     pub edge: Edge,
-    /// Whether it goes by itself, as those do that come by chance.
+    /// Whether it is a random thing, which goes away by itself.
     pub by_chance: bool,
 }
 
-/// Why hands leave a thing as it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+/// Why nothing was put or taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum HandsOff {
     /// The warehouse has no such edge.
-    #[error("there is no such way in this warehouse")]
     NoEdge,
     /// The ways are too short.
-    #[error(
-        "the ways are so short that a robot could not turn beside a thing; they must be {} cm or more",
-        room::LEAST_SIDE_WITH_THINGS_CM
-    )]
     NoRoom,
     /// The robot is there.
-    #[error("the robot is there; wait until it has gone on")]
     RobotThere,
     /// Nothing stands there.
-    #[error("nothing stands there")]
     NothingThere,
-    /// There are too many already.
-    #[error(
-        "{} things stand in the warehouse, and there is no room for more; take one first",
-        MOST_OBSTACLES
-    )]
+    /// Too many things stand already.
     Full,
 }
 
-/// All that stands on edges.
+/// All things on edges.
 #[derive(Clone, Debug)]
 pub(crate) struct Obstacles {
     side_cm: u16,
@@ -73,7 +63,7 @@ pub(crate) struct Obstacles {
     changes: u64,
 }
 
-/// One that comes and goes.
+/// A random thing.
 #[derive(Clone, Debug)]
 struct Thing {
     noise: Noise,
@@ -88,10 +78,10 @@ impl Thing {
 }
 
 impl Obstacles {
-    /// Those of the warehouse's file. What the ranger sees of them is the scene's.
+    /// The things of the warehouse's file. The scene puts the blocks for the ranger.
     pub(crate) fn new(warehouse: &Warehouse) -> Self {
         let side = scene::side_mm(warehouse);
-        let edge = |[a, b]: [[u8; 2]; 2]| Edge::between(a, b);
+        let edge = |[a, b]: [Node; 2]| Edge::between(a, b);
         let written = warehouse.obstacles.iter();
         Self {
             side_cm: warehouse.side_length_cm,
@@ -110,7 +100,7 @@ impl Obstacles {
         }
     }
 
-    /// From now on so many more come and go, all of them away at first.
+    /// From now on `count` random things come and go; at first all are away.
     pub(crate) fn scatter(&mut self, count: u32, seed: u64) {
         let thing = |number| Thing {
             noise: Noise::new(seed, STREAM + u64::from(number)),
@@ -120,22 +110,22 @@ impl Obstacles {
         self.things = (0..count).map(thing).collect();
     }
 
-    /// The length of a way in cm.
+    /// The length of an edge in cm.
     pub(crate) const fn side_cm(&self) -> u16 {
         self.side_cm
     }
 
-    /// What stands now.
+    /// The things that stand now.
     pub(crate) fn standing(&self) -> &[Standing] {
         &self.standing
     }
 
-    /// Counts what was put and taken, by whomever.
+    /// Counts the things that were put and taken, by people or by chance.
     pub(crate) const fn changes(&self) -> u64 {
         self.changes
     }
 
-    /// Puts a thing on an edge; one that stands there already stays.
+    /// Puts a thing on an edge; a thing that stands there already stays.
     pub(crate) fn put(
         &mut self,
         edge: Edge,
@@ -172,8 +162,8 @@ impl Obstacles {
         Ok(())
     }
 
-    /// Has nothing stand but `kept`. What came by chance goes again after its time, if as many come
-    /// and go as before.
+    /// Replaces all things by `kept`. A random thing goes away again after its time, as long as the
+    /// number of random things allows it.
     pub(crate) fn restore(&mut self, kept: &[Standing], now_ns: u64, blocks: &mut Vec<Block>) {
         for Standing { edge, .. } in self.standing.clone() {
             if let Some(block) = self.block(edge) {
@@ -199,7 +189,7 @@ impl Obstacles {
         }
     }
 
-    /// Puts and takes what is due among the `blocks` that stand in the hall.
+    /// Puts and takes the random things that are due, in `blocks` too.
     pub(crate) fn step(&mut self, now_ns: u64, pose: &Pose, blocks: &mut Vec<Block>) {
         for index in 0..self.things.len() {
             let thing = &mut self.things[index];
@@ -243,21 +233,17 @@ impl Obstacles {
     }
 }
 
-/// All edges between the nodes of so many squares.
-fn edges([columns, rows]: [u8; 2]) -> impl Iterator<Item = Edge> {
-    let nodes = (0..=columns).flat_map(move |x| (0..=rows).map(move |y| [x, y]));
-    nodes.flat_map(move |from| {
-        let [x, y] = from;
-        let right = (x < columns).then(|| [x + 1, y]);
-        let up = (y < rows).then(|| [x, y + 1]);
-        [right, up]
-            .into_iter()
-            .flatten()
-            .map(move |to| Edge { from, to })
-    })
+/// All edges between the nodes of `size` squares.
+fn edges(size: Node) -> impl Iterator<Item = Edge> {
+    let inside = move |node: Node| node.x <= size.x && node.y <= size.y;
+    let nodes = (0..=size.x).flat_map(move |x| (0..=size.y).map(move |y| Node::new(x, y)));
+    nodes
+        .flat_map(|node| [Heading::Right, Heading::Up].map(|way| Edge::leaving(node, way)))
+        .flatten()
+        .filter(move |edge| inside(edge.to))
 }
 
-/// From the robot's axle to the middle of a block.
+/// Distance from the robot's axle to the middle of a block.
 fn distance(pose: &Pose, block: &Block) -> f64 {
     let middle = |axis: usize| f64::midpoint(block.low[axis], block.high[axis]);
     (middle(0) - pose.x).hypot(middle(1) - pose.y)
@@ -267,7 +253,7 @@ fn distance(pose: &Pose, block: &Block) -> f64 {
 mod tests {
     use super::*;
 
-    /// Runs for `seconds` with a robot that stands at `pose`; what stood at each tenth of a second.
+    /// Runs for `seconds` with a robot at `pose`. Returns the things at each tenth of a second.
     fn run(seed: u64, pose: &Pose, seconds: u64) -> Vec<Vec<Block>> {
         let warehouse = Warehouse::builtin("small").expect("built in");
         let mut obstacles = Obstacles::new(&warehouse);
@@ -307,11 +293,11 @@ mod tests {
 
     #[test]
     fn every_edge_is_a_place() {
-        assert_eq!(edges([3, 2]).count(), 3 * 3 + 2 * 4);
+        assert_eq!(edges(Node::new(3, 2)).count(), 3 * 3 + 2 * 4);
     }
 
     fn first_two() -> [Edge; 2] {
-        [([0, 0], [1, 0]), ([1, 0], [2, 0])].map(|(from, to)| Edge { from, to })
+        [0, 1].map(|x| Edge::of(Node::new(x, 0), Heading::Down))
     }
 
     #[test]
@@ -337,8 +323,8 @@ mod tests {
             Err(HandsOff::NothingThere)
         );
         let outside = Edge {
-            from: [9, 0],
-            to: [10, 0],
+            from: Node::new(9, 0),
+            to: Node::new(10, 0),
         };
         assert_eq!(
             obstacles.put(outside, &pose, &mut blocks),

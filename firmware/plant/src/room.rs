@@ -1,4 +1,4 @@
-//! Whether the robot has room: beside a thing in the middle of a way, and beside shelves.
+//! How long the ways must be so that a robot has room beside things and beside shelves.
 //!
 //! ```text
 //!      |   .- - -.   |        A robot that turns on a crossing sweeps a circle as wide as its
@@ -6,11 +6,11 @@
 //!      |   `- - -'   |        side of a square, must stand outside it. The ranger looks ahead, so
 //!      |             |        a robot cannot know what stands beside it before it turns there.
 //! ```
-//! It knows measures only: what breaks them is refused elsewhere.
+//! It knows only lengths; other modules refuse a warehouse that is too small.
 
-/// The shortest side in cm of squares with things in the middle of their ways.
+/// The shortest side in cm of a square if things stand in the middle of edges.
 pub const LEAST_SIDE_WITH_THINGS_CM: u16 = 50;
-/// The shortest side in cm of squares in which goods stand.
+/// The shortest side in cm of a square in which goods stand.
 pub const LEAST_SIDE_WITH_GOODS_CM: u16 = 45;
 
 #[cfg(test)]
@@ -19,10 +19,10 @@ mod tests {
     use crate::contact::{FRONT, HALF_WIDTH, REAR};
     use crate::scene::{OBSTACLE_ALONG, SHELF, STAND};
 
-    /// How far a robot may stand from the middle of its crossing, station or line, in mm.
+    /// A robot stands at most this far from the middle of its crossing, station or line, in mm.
     const OFF: f64 = 15.0;
 
-    /// The shortest whole side in cm for which this much room in mm is left.
+    /// The shortest whole side in cm that leaves enough room; `room` gives the rest in mm.
     fn least_cm(room: impl Fn(f64) -> f64) -> Option<u16> {
         (1..=100).find(|side| room(f64::from(*side) * 10.0) >= 0.0)
     }
@@ -31,7 +31,7 @@ mod tests {
     fn a_robot_can_turn_beside_a_thing_on_the_shortest_way_that_may_have_one() {
         let corner = FRONT.hypot(HALF_WIDTH) + OFF;
         let on_a_crossing = least_cm(|side| side / 2.0 - OBSTACLE_ALONG / 2.0 - corner);
-        // Who halts before a thing turns round beside the shelf on the far side of the square.
+        // A robot that halts in front of a thing turns beside the square's opposite shelf.
         let between = least_cm(|side| side - STAND - SHELF / 2.0 - corner);
         assert_eq!(on_a_crossing.max(between), Some(LEAST_SIDE_WITH_THINGS_CM));
     }

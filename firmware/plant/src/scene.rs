@@ -1,30 +1,32 @@
-//! Where the things of a warehouse stand, in mm.
+//! The places of a warehouse's things, in mm.
 //!
 //! It turns the numbers of a [`Warehouse`] into points and boxes on the floor, in one place, so
-//! that the tape, the ranger and the goods agree about them.
+//! that tape, ranger and goods use the same ones.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use crate::body::Pose;
-use crate::warehouse::{Edge, Product, Side, Warehouse};
+use lager_floor::{Edge, Heading, Node, Place};
 
-/// How far goods stand from the middle of their edge, in mm.
+use crate::body::Pose;
+use crate::warehouse::{NamedProduct, Warehouse};
+
+/// Distance from goods to the middle of their edge, in mm.
 pub const STAND: f64 = 250.0;
 /// Height of the middle of goods on a shelf, in mm.
 pub const SHELF_HEIGHT: f64 = 60.0;
 /// Side of the shelf under one piece of goods, in mm.
 pub const SHELF: f64 = 80.0;
-/// Extent of an obstacle along its edge, in mm.
+/// Length of an obstacle along its edge, in mm.
 pub const OBSTACLE_ALONG: f64 = 80.0;
-/// Extent of an obstacle across its edge, in mm.
+/// Length of an obstacle across its edge, in mm.
 pub const OBSTACLE_ACROSS: f64 = 160.0;
 
-/// How far the walls of the hall are from all tape, in mm.
+/// Distance from the walls of the hall to the nearest tape, in mm.
 const HALL: f64 = 1_500.0;
-/// How thick they are, in mm.
+/// Thickness of the walls, in mm.
 const WALL: f64 = 100.0;
 
-/// A box on the floor that the ranger sees, sides along the axes.
+/// A box on the floor that the ranger sees; its sides are parallel to the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
     /// Smallest x and y.
@@ -42,9 +44,9 @@ impl Block {
     }
 }
 
-/// The node's place.
-pub fn node(at: [u8; 2], side: f64) -> (f64, f64) {
-    (f64::from(at[0]) * side, f64::from(at[1]) * side)
+/// The place of a node.
+pub fn node(at: Node, side: f64) -> (f64, f64) {
+    (f64::from(at.x) * side, f64::from(at.y) * side)
 }
 
 /// The middle of an edge.
@@ -53,30 +55,21 @@ pub fn middle(edge: Edge, side: f64) -> (f64, f64) {
     (f64::midpoint(a.0, b.0), f64::midpoint(a.1, b.1))
 }
 
-/// The direction from the middle of a side into its square.
-pub fn inwards(side: Side) -> (f64, f64) {
-    match side {
-        Side::Left => (1.0, 0.0),
-        Side::Up => (0.0, -1.0),
-        Side::Right => (-1.0, 0.0),
-        Side::Down => (0.0, 1.0),
-    }
+/// The place of goods that are reached from side `from` of a square; `side` is the side of a square
+/// in mm.
+pub fn stand(square: Node, from: Heading, side: f64) -> (f64, f64) {
+    let (x, y) = middle(Edge::of(square, from), side);
+    let (dx, dy) = from.back().step();
+    (x + STAND * f64::from(dx), y + STAND * f64::from(dy))
 }
 
-/// Where a product's goods stand; `side` is the side of a square in mm.
-pub fn stand(product: &Product, side: f64) -> (f64, f64) {
-    let (x, y) = middle(Edge::of(product.square, product.side), side);
-    let (dx, dy) = inwards(product.side);
-    (x + STAND * dx, y + STAND * dy)
-}
-
-/// Where a product's goods stand and how high, as a point.
-pub fn stand_3d(product: &Product, side: f64) -> [f64; 3] {
-    let (x, y) = stand(product, side);
+/// The place of a product's goods, with their height.
+pub fn stand_3d(product: &NamedProduct, side: f64) -> [f64; 3] {
+    let (x, y) = stand(product.square, product.side, side);
     [x, y, SHELF_HEIGHT]
 }
 
-/// The start: on the delivery node, looking into the warehouse along x (AMB-50).
+/// The start: on the delivery node, heading into the warehouse along x (AMB-50).
 pub fn start(warehouse: &Warehouse) -> Pose {
     let (x, y) = node(warehouse.delivery, side_mm(warehouse));
     let heading = if warehouse.starts_towards_plus_x() {
@@ -87,12 +80,11 @@ pub fn start(warehouse: &Warehouse) -> Pose {
     Pose { x, y, heading }
 }
 
-/// A robot put on a node, looking `quarters` quarter turns counter-clockwise from +x; `None` if
-/// there is no such node.
-pub fn pose_at(warehouse: &Warehouse, at: [u8; 2], quarters: u8) -> Option<Pose> {
-    let inside = at[0] <= warehouse.size[0] && at[1] <= warehouse.size[1];
-    let (x, y) = node(at, side_mm(warehouse));
-    let heading = f64::from(quarters) * FRAC_PI_2;
+/// The pose of a robot at a place; `None` if there is no such node.
+pub fn pose_at(warehouse: &Warehouse, at: Place) -> Option<Pose> {
+    let inside = at.node.x <= warehouse.size.x && at.node.y <= warehouse.size.y;
+    let (x, y) = node(at.node, side_mm(warehouse));
+    let heading = f64::from(at.heading.quarters_right_to(Heading::Right)) * FRAC_PI_2;
     inside.then_some(Pose { x, y, heading })
 }
 
@@ -103,30 +95,27 @@ pub fn side_mm(warehouse: &Warehouse) -> f64 {
 
 /// An obstacle across the middle of an edge.
 pub(crate) fn obstacle(edge: Edge, side: f64) -> Block {
-    let horizontal = edge.from[1] == edge.to[1];
-    let (width, height) = if horizontal {
-        (OBSTACLE_ALONG, OBSTACLE_ACROSS)
-    } else {
-        (OBSTACLE_ACROSS, OBSTACLE_ALONG)
+    let (width, height) = match edge.heading() {
+        Heading::Left | Heading::Right => (OBSTACLE_ALONG, OBSTACLE_ACROSS),
+        Heading::Up | Heading::Down => (OBSTACLE_ACROSS, OBSTACLE_ALONG),
     };
     Block::around(middle(edge, side), width, height)
 }
 
-/// Everything the IR ranger can see: obstacles and shelves.
+/// Everything that the IR ranger can see: obstacles and shelves.
 pub fn blocks(warehouse: &Warehouse) -> Vec<Block> {
     let side = side_mm(warehouse);
     let obstacles = warehouse.obstacles.iter().filter_map(|stands| {
         let edge = Edge::between(stands.between[0], stands.between[1])?;
         Some(obstacle(edge, side))
     });
-    let shelves = warehouse
-        .products
-        .iter()
-        .map(|product| Block::around(stand(product, side), SHELF, SHELF));
+    let products = warehouse.products.iter();
+    let stands = products.map(|product| stand(product.square, product.side, side));
+    let shelves = stands.map(|middle| Block::around(middle, SHELF, SHELF));
     obstacles.chain(shelves).collect()
 }
 
-/// The walls of a hall around tape that lies between these corners.
+/// The walls of a hall, around the corners of all tape.
 pub fn walls(low: [f64; 2], high: [f64; 2]) -> [Block; 4] {
     let (x0, y0) = (low[0] - HALL, low[1] - HALL);
     let (x1, y1) = (high[0] + HALL, high[1] + HALL);
@@ -145,16 +134,11 @@ mod tests {
 
     #[test]
     fn goods_stand_inside_their_square() {
-        let product = |side| Product {
-            id: 1,
-            name: None,
-            square: [1, 2],
-            side,
-        };
-        assert_eq!(stand(&product(Side::Left), 500.0), (750.0, 1250.0));
-        assert_eq!(stand(&product(Side::Down), 600.0), (900.0, 1450.0));
-        assert_eq!(stand(&product(Side::Up), 600.0), (900.0, 1550.0));
-        assert_eq!(stand(&product(Side::Right), 600.0), (950.0, 1500.0));
+        let square = Node::new(1, 2);
+        assert_eq!(stand(square, Heading::Left, 500.0), (750.0, 1250.0));
+        assert_eq!(stand(square, Heading::Down, 600.0), (900.0, 1450.0));
+        assert_eq!(stand(square, Heading::Up, 600.0), (900.0, 1550.0));
+        assert_eq!(stand(square, Heading::Right, 600.0), (950.0, 1500.0));
     }
 
     #[test]
@@ -168,7 +152,7 @@ mod tests {
                 heading: 0.0
             }
         );
-        warehouse.delivery = [2, 2];
+        warehouse.delivery = Node::new(2, 2);
         assert_eq!(
             start(&warehouse),
             Pose {
@@ -183,10 +167,11 @@ mod tests {
     fn a_robot_can_be_put_on_every_node_and_beside_none() {
         let warehouse = Warehouse::builtin("small").unwrap();
         let pose = |x, y, heading| Some(Pose { x, y, heading });
-        assert_eq!(pose_at(&warehouse, [0, 0], 0), Some(start(&warehouse)));
-        assert_eq!(pose_at(&warehouse, [2, 1], 2), pose(1000.0, 500.0, PI));
-        assert_eq!(pose_at(&warehouse, [3, 0], 0), None);
-        assert_eq!(pose_at(&warehouse, [0, 3], 0), None);
+        let at = |x, y, heading| pose_at(&warehouse, Place::new(Node::new(x, y), heading));
+        assert_eq!(at(0, 0, Heading::Right), Some(start(&warehouse)));
+        assert_eq!(at(2, 1, Heading::Left), pose(1000.0, 500.0, PI));
+        assert_eq!(at(3, 0, Heading::Right), None);
+        assert_eq!(at(0, 3, Heading::Right), None);
     }
 
     #[test]
@@ -194,7 +179,7 @@ mod tests {
         let mut warehouse = Warehouse::builtin("small").unwrap();
         warehouse.products.clear();
         warehouse.obstacles.push(crate::Obstacle {
-            between: [[0, 1], [0, 0]],
+            between: [Node::new(0, 1), Node::new(0, 0)],
         });
         assert_eq!(
             blocks(&warehouse),

@@ -1,9 +1,9 @@
-//! The tape on the floor: is there tape at this point, and how much of a small spot does it cover?
+//! The tape on the floor: tells whether a point is on tape, and how much of a spot tape covers.
 //!
-//! Everything is a signed distance: negative on the tape, positive beside it, in mm. The grid is
-//! computed, not searched (the nearest grid line and the four marks of the square at hand), so a
-//! test costs the same in any warehouse. The line sensor asks eleven times every 5 ms, and first
-//! which tape is [`Near`] all of its spots: what is not covers none of them.
+//! All results are signed distances in mm: negative on the tape, positive beside it. The grid is
+//! calculated and not searched (the nearest grid line, and the four marks of the square at hand),
+//! so a test costs the same in any warehouse. The line sensor asks eleven times every 5 ms; it
+//! first finds the tape that is [`Near`] any of its spots, and then looks at no other.
 //!
 //! ```text
 //!   +-----+-----+   crossings at the border have only the ways that exist,
@@ -14,27 +14,29 @@
 //!  -+-- bar: 300 mm across the end of the exit line (E4)
 //! ```
 
+use lager_floor::Heading;
+
 use crate::body::Pose;
 pub use crate::exit::{BAR, WIDTH};
 use crate::exit::{FAR, HALF, Piece, exit};
 use crate::scene::side_mm;
-use crate::warehouse::{Side, Warehouse};
+use crate::warehouse::Warehouse;
 
 /// Length of a station's mark in mm, from the middle of the edge's tape (E5).
 pub const MARK: f64 = 170.0;
 /// Goods that lie within this distance of the middle of the bar, in mm, count as delivered.
 pub const DELIVERY_RADIUS: f64 = 400.0;
 
-/// Farther away than this, in mm, a robot is not beside the exit's line: its sensors lost it
-/// before.
+/// A robot farther from the exit line than this, in mm, does not follow it: its sensors have lost
+/// it.
 const BESIDE: f64 = 75.0;
 
-/// Which tape may be near a place, as [`Tape::near`] has found it.
+/// The tape that may be near a place; [`Tape::near`] finds it.
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
     grid: bool,
     mark: bool,
-    /// The pieces of the exit, a bit for each.
+    /// The pieces of the exit line, a bit for each.
     exit: u8,
 }
 
@@ -44,10 +46,10 @@ pub struct Tape {
     side: f64,
     columns: usize,
     rows: usize,
-    /// For each square, row by row from below: which of its sides have a mark, bit `Side as u8`.
+    /// For each square, row by row from below: the sides with a mark, as bits `Side as u8`.
     marks: Vec<u8>,
     exit: Vec<Piece>,
-    /// Around all of `exit`, in mm.
+    /// The corners of a box around `exit`, in mm.
     exit_low: [f64; 2],
     exit_high: [f64; 2],
     bar: Pose,
@@ -56,13 +58,10 @@ pub struct Tape {
 impl Tape {
     /// Lays the tape of a valid warehouse.
     pub fn new(warehouse: &Warehouse) -> Self {
-        let (columns, rows) = (
-            usize::from(warehouse.size[0]),
-            usize::from(warehouse.size[1]),
-        );
+        let (columns, rows) = (usize::from(warehouse.size.x), usize::from(warehouse.size.y));
         let mut marks = vec![0; columns * rows];
         for product in &warehouse.products {
-            let [x, y] = product.square.map(usize::from);
+            let (x, y) = (usize::from(product.square.x), usize::from(product.square.y));
             marks[y * columns + x] |= 1 << product.side as u8;
         }
         let (exit, bar) = exit(warehouse);
@@ -89,24 +88,24 @@ impl Tape {
         self.bar
     }
 
-    /// Whether goods that lie here count as delivered.
+    /// Whether goods count as delivered at this point.
     pub fn is_delivered(&self, x: f64, y: f64) -> bool {
         (x - self.bar.x).hypot(y - self.bar.y) <= DELIVERY_RADIUS
     }
 
-    /// The part of a round spot, 0 to 1, that is on tape; exact to a few percent where the spot
-    /// is smaller than the tape and no corner is near. Looks only at what is `near` the spot.
+    /// The part of a round spot that is on tape, 0 to 1. It is exact to a few percent if the spot
+    /// is smaller than the tape and no corner is close. It looks only at the tape in `near`.
     pub fn coverage(&self, near: Near, x: f64, y: f64, spot_radius: f64) -> f64 {
         (0.5 - self.distance_to(near, x, y) / (2.0 * spot_radius)).clamp(0.0, 1.0)
     }
 
-    /// Distance to the nearest edge of the tape in mm: negative on the tape. Beyond a few cm it
-    /// only says that it is far.
+    /// Distance to the nearest edge of the tape in mm, negative on the tape. From a few cm on it is
+    /// not exact, only large.
     pub fn distance(&self, x: f64, y: f64) -> f64 {
         self.distance_to(self.near(x, y, BAR), x, y)
     }
 
-    /// The tape that may be as near to a point as `reach`, in mm.
+    /// The tape that may be within `reach` mm of a point.
     pub fn near(&self, x: f64, y: f64, reach: f64) -> Near {
         let is_over = |low: f64, value: f64, high: f64| low < value && value < high;
         let is_by_exit = is_over(self.exit_low[0], x, self.exit_high[0])
@@ -141,7 +140,7 @@ impl Tape {
         distance
     }
 
-    /// The corners that all tape lies between, in mm.
+    /// Two corners, in mm, of a box that contains all tape.
     pub fn extent(&self) -> [[f64; 2]; 2] {
         let (width, height) = self.grid_size();
         // The exit's box has a margin of a bar's length.
@@ -152,9 +151,9 @@ impl Tape {
         ]
     }
 
-    /// How far a point is from the middle of the line that a robot with this heading follows, in
-    /// mm; nothing where there is none along the heading. Lines go on beyond their ends, so that
-    /// a robot that runs over one is still beside it.
+    /// Distance in mm from a point to the middle of the line that a robot with this heading
+    /// follows; `None` if there is no line along the heading. Each line is longer here than its
+    /// tape, so that a robot that has passed its end is still beside it.
     pub fn beside(&self, x: f64, y: f64, heading: f64) -> Option<f64> {
         let (width, height) = self.grid_size();
         let slack = self.side / 2.0;
@@ -178,11 +177,11 @@ impl Tape {
         line.iter()
             .filter_map(|piece| piece.beside(x, y, heading))
             .min_by(f64::total_cmp)
-            // Farther away it is beside another line, or none.
+            // Farther away the robot is beside another line, or none.
             .filter(|off| *off < BESIDE)
     }
 
-    /// Whether a point is out of the grid on the side of the exit.
+    /// Whether a point is outside the grid on the side of the exit.
     fn is_over_exit(&self, x: f64) -> bool {
         match self.bar.x < 0.0 {
             true => x < -HALF,
@@ -199,7 +198,7 @@ impl Tape {
 
     fn grid(&self, x: f64, y: f64) -> f64 {
         let (width, height) = self.grid_size();
-        // Cut off, which is quicker than rounding.
+        // Truncating is quicker than rounding.
         let nearest = |value: f64, most: usize| {
             ((value / self.side + 0.5).max(0.0) as usize).min(most) as f64 * self.side
         };
@@ -209,9 +208,9 @@ impl Tape {
         upright.min(level)
     }
 
-    /// The column or row of squares that is nearest to `value`, of so many.
+    /// The index of the nearest column or row of squares to `value`; there are `count`.
     fn square(&self, value: f64, count: usize) -> usize {
-        // Cut off below 0.
+        // The conversion gives 0 for negative values.
         ((value / self.side) as usize).min(count - 1)
     }
 
@@ -229,7 +228,7 @@ impl Tape {
         })
     }
 
-    /// How far a point is from the marks in a square.
+    /// Distance from a point to the nearest mark in a square.
     fn mark_of(&self, column: usize, row: usize, x: f64, y: f64) -> f64 {
         let marks = self.marks[row * self.columns + column];
         if marks == 0 {
@@ -238,13 +237,13 @@ impl Tape {
         let (u, v) = (x - column as f64 * self.side, y - row as f64 * self.side);
         let half = self.side / 2.0;
         let mut distance = FAR;
-        for side in Side::ALL {
+        for side in Heading::ALL {
             if marks & 1 << side as u8 != 0 {
                 let (depth, across) = match side {
-                    Side::Left => (u, v - half),
-                    Side::Up => (self.side - v, u - half),
-                    Side::Right => (self.side - u, v - half),
-                    Side::Down => (v, u - half),
+                    Heading::Left => (u, v - half),
+                    Heading::Up => (self.side - v, u - half),
+                    Heading::Right => (self.side - u, v - half),
+                    Heading::Down => (v, u - half),
                 };
                 let along = (-depth).max(depth - MARK);
                 distance = distance.min((across.abs() - HALF).max(along));
@@ -258,8 +257,10 @@ impl Tape {
 mod tests {
     use core::f64::consts::PI;
 
+    use lager_floor::Node;
+
     use super::*;
-    use crate::warehouse::Product;
+    use crate::warehouse::NamedProduct;
 
     fn small() -> Tape {
         Tape::new(&Warehouse::builtin("small").unwrap())
@@ -350,15 +351,15 @@ mod tests {
     fn every_side_of_a_square_has_its_mark() {
         let mut warehouse = Warehouse::builtin("small").unwrap();
         for (side, x, y) in [
-            (Side::Left, 100.0, 250.0),
-            (Side::Up, 250.0, 400.0),
-            (Side::Right, 400.0, 250.0),
-            (Side::Down, 250.0, 100.0),
+            (Heading::Left, 100.0, 250.0),
+            (Heading::Up, 250.0, 400.0),
+            (Heading::Right, 400.0, 250.0),
+            (Heading::Down, 250.0, 100.0),
         ] {
-            warehouse.products = vec![Product {
+            warehouse.products = vec![NamedProduct {
                 id: 1,
                 name: None,
-                square: [0, 0],
+                square: Node::new(0, 0),
                 side,
             }];
             let tape = Tape::new(&warehouse);

@@ -1,4 +1,4 @@
-//! The warehouse as people write it down: size, delivery corner, exit, products, obstacles.
+//! The warehouse as people write it in a file: size, delivery corner, exit, products, obstacles.
 //!
 //! ```text
 //!   y                               size = [2, 1], side_length_cm = 50
@@ -10,24 +10,18 @@
 //!        /
 //!  =----+  exit, ends at the delivery bar
 //! ```
-//! A file is only data: [`Warehouse::validate`] says in a sentence what cannot be built. This
-//! module knows nothing of tape widths or coordinates in mm; `scene.rs` does.
+//! A file is only data: [`Warehouse::validate`] says in a sentence why it cannot be built. This
+//! module knows no tape widths and no coordinates in mm; `scene.rs` does.
 
+use lager_floor::{FloorError, Grid, Heading, Node, Product, SideLength};
+use lager_orders::Reason;
 use serde::{Deserialize, Serialize};
 
-/// Squares along one axis, at most: the robot's map has up to 100 nodes there.
-pub const MAX_SQUARES: u8 = 99;
-/// Products in one warehouse, at most: as many as the robot's map holds.
-pub const MAX_PRODUCTS: usize = 256;
-/// Smallest side of a square in cm: the marks are 17 cm long and goods stand behind them.
-pub const MIN_SIDE_CM: u16 = 40;
-/// Largest side of a square in cm.
-pub const MAX_SIDE_CM: u16 = 500;
 /// Smallest radius of the exit line in cm (E3).
 pub const MIN_RADIUS_CM: u16 = 25;
 /// Straight part in cm before the first and after the last curve of the exit line.
 pub const STRAIGHT_CM: u16 = 20;
-/// Least contrast between floor and tape, in steps of the sensors' 8 bits.
+/// Least contrast between tape and floor, in steps of the sensors' 8 bits.
 pub const LEAST_CONTRAST: f64 = 20.0;
 /// Longest exit line in cm.
 pub const MAX_EXIT_CM: u16 = 1_000;
@@ -37,19 +31,19 @@ pub const MAX_EXIT_CM: u16 = 1_000;
 #[serde(deny_unknown_fields)]
 pub struct Warehouse {
     /// Squares in x and in y; the nodes run from (0, 0) to this (M2).
-    pub size: [u8; 2],
+    pub size: Node,
     /// Side of a square in cm (C3).
     pub side_length_cm: u16,
-    /// The corner node the exit leaves from (M2).
+    /// The corner node at which the exit line begins (M2).
     #[serde(default)]
-    pub delivery: [u8; 2],
+    pub delivery: Node,
     /// The line that leaves the warehouse.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Exit::is_usual")]
     pub exit: Exit,
     /// Products and their stations (M3).
     #[serde(default, rename = "product", skip_serializing_if = "Vec::is_empty")]
-    pub products: Vec<Product>,
-    /// How light floor and tape look to the line sensors.
+    pub products: Vec<NamedProduct>,
+    /// The brightness of floor and tape for the line sensors.
     #[serde(default, skip_serializing_if = "Floor::is_usual")]
     pub floor: Floor,
     /// Things that stand on an edge (E6).
@@ -79,8 +73,8 @@ impl Default for Exit {
     }
 }
 
-/// What the line sensors read over the floor and over the tape, 8 bits, the middle of all
-/// sensors. A dark floor or a worn tape has a weak contrast.
+/// Readings of the line sensors over floor and tape, 8 bits, as the mean of all sensors. A dark
+/// floor or a worn tape has a weak contrast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Floor {
@@ -100,7 +94,7 @@ impl Default for Floor {
 }
 
 impl Floor {
-    /// Tape less floor.
+    /// The tape's reading minus the floor's.
     pub fn contrast(self) -> f64 {
         f64::from(self.tape) - f64::from(self.white)
     }
@@ -110,7 +104,7 @@ impl Floor {
     }
 }
 
-/// How the exit line runs, seen by a robot that leaves.
+/// The shape of the exit line, seen by a robot that leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Curve {
@@ -137,96 +131,70 @@ impl Curve {
     }
 }
 
-/// A product and where it is picked.
+/// A product and the place where the robot picks it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Product {
+pub struct NamedProduct {
     /// The product's number.
     pub id: i32,
-    /// What people call it; the robot knows numbers only.
+    /// The name that people use; the robot uses numbers only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// The square it stands in.
-    pub square: [u8; 2],
-    /// The side of the square it is reached from.
-    pub side: Side,
+    pub square: Node,
+    /// The side of the square from which the robot reaches it.
+    pub side: Heading,
 }
 
-/// A side of a square, in the order of the goods protocol (M3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Side {
-    /// The side with the smaller x.
-    Left = 0,
-    /// The side with the larger y.
-    Up = 1,
-    /// The side with the larger x.
-    Right = 2,
-    /// The side with the smaller y.
-    Down = 3,
-}
-
-impl Side {
-    /// All four, clockwise from the left.
-    pub const ALL: [Side; 4] = [Side::Left, Side::Up, Side::Right, Side::Down];
-}
-
-/// Something that stands in the middle of an edge.
+/// A thing that stands in the middle of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
     /// The two nodes of the edge.
-    pub between: [[u8; 2]; 2],
-}
-
-/// The tape between two neighbouring nodes; `from` is the one with the smaller coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Edge {
-    /// The node at the left or lower end.
-    pub from: [u8; 2],
-    /// The node at the right or upper end.
-    pub to: [u8; 2],
-}
-
-impl Edge {
-    /// The edge at one side of a square (AMB-37).
-    pub fn of(square: [u8; 2], side: Side) -> Self {
-        let [x, y] = square;
-        let (from, to) = match side {
-            Side::Left => ([x, y], [x, y + 1]),
-            Side::Up => ([x, y + 1], [x + 1, y + 1]),
-            Side::Right => ([x + 1, y], [x + 1, y + 1]),
-            Side::Down => ([x, y], [x + 1, y]),
-        };
-        Self { from, to }
-    }
-
-    /// The edge between two nodes, if they are neighbours.
-    pub fn between(a: [u8; 2], b: [u8; 2]) -> Option<Self> {
-        let (from, to) = if a <= b { (a, b) } else { (b, a) };
-        let across = from[1] == to[1] && to[0].checked_sub(from[0]) == Some(1);
-        let along = from[0] == to[0] && to[1].checked_sub(from[1]) == Some(1);
-        (across || along).then_some(Self { from, to })
-    }
+    pub between: [Node; 2],
 }
 
 impl Warehouse {
-    /// The products as the map of the warehouse lists them (M3): number, square, side.
-    pub fn map_products(&self) -> impl ExactSizeIterator<Item = (i32, [u8; 2], Side)> + '_ {
-        self.products
-            .iter()
-            .map(|product| (product.id, product.square, product.side))
+    /// The parts of it that a robot gets: side length, grid and products.
+    ///
+    /// # Errors
+    /// No floor, simulated or real, can be like that.
+    pub fn told(&self) -> Result<(SideLength, Grid, Vec<Product>), Reason> {
+        let grid = Grid::new(self.size, self.delivery)?;
+        let side = SideLength::new(self.side_length_cm)?;
+        let products = self.products.iter().map(NamedProduct::told);
+        let products = products.collect::<Result<Vec<_>, _>>()?;
+        grid.check(&products)?;
+        Ok((side, grid, products))
     }
 
-    /// Where a robot stands at the start: the delivery node, looking into the warehouse along x
-    /// (AMB-50). `true` if that is towards +x.
+    /// The robot starts at the delivery node, heading into the warehouse along x (AMB-50). `true`
+    /// if that is towards +x.
     pub fn starts_towards_plus_x(&self) -> bool {
-        self.delivery[0] == 0
+        self.delivery.x == 0
+    }
+}
+
+impl NamedProduct {
+    /// The product as a robot gets it, without a name.
+    ///
+    /// # Errors
+    /// The product's number is negative.
+    pub fn told(&self) -> Result<Product, FloorError> {
+        Ok(Product {
+            id: self.id.try_into()?,
+            square: self.square,
+            side: self.side,
+        })
     }
 }
 
 impl Exit {
-    /// The shortest line its curves fit into, in cm.
+    fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The shortest line that its curves fit into, in cm.
     pub fn least_length_cm(&self) -> u16 {
         let turned: f64 = self.curve.arcs_deg().iter().map(|arc| arc.abs()).sum();
         let curved = f64::from(self.radius_cm) * turned.to_radians();
@@ -260,11 +228,11 @@ mod tests {
         assert_eq!(warehouse.validate(), Ok(()));
         assert_eq!(
             warehouse.products,
-            [Product {
+            [NamedProduct {
                 id: 4,
                 name: Some("screws".into()),
-                square: [1, 0],
-                side: Side::Up
+                square: Node::new(1, 0),
+                side: Heading::Up
             }]
         );
         assert_eq!(warehouse.exit.curve, Curve::Left);
@@ -273,17 +241,5 @@ mod tests {
         assert!(
             toml::from_str::<Warehouse>("size = [1, 1]\nside_length_cm = 50\ncolour = 1").is_err()
         );
-    }
-
-    #[test]
-    fn the_same_edge_has_two_names() {
-        assert_eq!(Edge::of([0, 0], Side::Right), Edge::of([1, 0], Side::Left));
-        assert_eq!(Edge::of([0, 0], Side::Up), Edge::of([0, 1], Side::Down));
-        assert_eq!(
-            Edge::between([1, 1], [1, 0]),
-            Some(Edge::of([1, 0], Side::Left))
-        );
-        assert_eq!(Edge::between([0, 1], [1, 0]), None);
-        assert_eq!(Edge::between([1, 1], [1, 1]), None);
     }
 }

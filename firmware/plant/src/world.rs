@@ -1,10 +1,13 @@
-//! The whole world in one value: what the boards' pins are connected to.
+//! The whole world in one value, which the boards' pins are connected to.
 //!
-//! It advances in steps of one millisecond, always at the same instants, however the caller cuts
-//! the time; so a run depends on the seed and on what the boards do, and on nothing else. It
-//! never decides anything a board or a person decides.
+//! It advances in steps of one millisecond, always at the same instants, however the caller divides
+//! the time. So a run depends only on the seed and on the boards. It never decides anything that a
+//! board or a person decides.
 
 use core::time::Duration;
+
+use lager_floor::Edge;
+use serde::{Deserialize, Serialize};
 
 use crate::arm::{self, SERVOS};
 use crate::battery::Battery;
@@ -21,17 +24,16 @@ use crate::scene::{self, Block};
 use crate::servo::ServoBus;
 use crate::tape::Tape;
 use crate::validate::{WarehouseError, room_for_things};
-use crate::warehouse::{Edge, Warehouse};
+use crate::warehouse::Warehouse;
 use crate::weave::Weave;
 
-/// In how many steps the body is once compared with what it may touch, and the battery with what
-/// is drawn from it.
+/// The body's contacts and the battery are calculated only once in so many steps.
 const SELDOM: u64 = 5;
 /// How inexactly people put the robot down, in mm and rad.
 const PLACING: f64 = 3.0;
 const PLACING_ANGLE: f64 = 0.015;
 
-/// The streams of noise.
+/// Numbers of the noise streams.
 mod stream {
     pub(super) const LEFT_MOTOR: u64 = 1;
     pub(super) const RIGHT_MOTOR: u64 = 2;
@@ -43,12 +45,12 @@ mod stream {
     pub(super) const SERVOS: u64 = 8;
 }
 
-/// What is worth keeping of a world, to go on with it elsewhere.
-#[derive(Clone, Debug, PartialEq)]
+/// The part of a world that is kept, to go on with it elsewhere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WorldState {
     /// Time since the start of the world.
     pub time: Duration,
-    /// Where the robot stands.
+    /// The robot's pose.
     pub pose: Pose,
     /// Speeds of the left and the right wheels in mm/s.
     pub wheel_speeds: [f64; 2],
@@ -58,10 +60,21 @@ pub struct WorldState {
     pub goods: Vec<Good>,
     /// The part of the battery's charge that is left, 0 to 1.
     pub battery_charge: f64,
-    /// How often the body has run into something.
+    /// How often the body has hit something.
     pub collisions: u32,
-    /// What stands on edges.
+    /// The things on edges.
     pub obstacles: Vec<Standing>,
+}
+
+/// The true state of the robot, which its own boards do not know.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// The kept part of the world.
+    pub world: WorldState,
+    /// Duties at the left and the right motor driver, negative backwards.
+    pub duties: [i16; 2],
+    /// The product in the claw.
+    pub carrying: Option<i32>,
 }
 
 /// A warehouse with a robot in it.
@@ -81,18 +94,18 @@ pub struct World {
     line: LineSensor,
     ir: IrRanger,
     servos: ServoBus,
-    /// Where the servos stand, and with them the claw.
+    /// The servos' positions, and the claw at these positions.
     arm: ([f64; SERVOS], arm::Claw),
     now_ns: u64,
 }
 
 impl World {
-    /// The step in which the world advances.
+    /// The length of the steps in which the world advances.
     pub const STEP: Duration = Duration::from_millis(1);
     const STEP_NS: u64 = 1_000_000;
 
-    /// The warehouse at its start, the robot at the delivery node, the arm at
-    /// `servo_positions`. `seed` chooses all imperfections, as far as `make` has any.
+    /// The warehouse at its start: the robot at the delivery node, the arm at `servo_positions`.
+    /// `seed` chooses all imperfections that `make` allows.
     ///
     /// # Errors
     /// The warehouse cannot be built.
@@ -142,7 +155,7 @@ impl World {
         Duration::from_nanos(self.now_ns)
     }
 
-    /// Advances to the last step that is not after `now`. Time never goes back.
+    /// Advances to the last step at or before `now`. Time never goes back.
     pub fn advance_to(&mut self, now: Duration) {
         let now = now.as_nanos() as u64;
         while self.now_ns + Self::STEP_NS <= now {
@@ -164,13 +177,13 @@ impl World {
         self.battery.volts()
     }
 
-    /// Puts another charge in the battery's place, 0 to 1. One of a robot as drawn has no charge.
+    /// Sets the battery's charge, 0 to 1; for a robot as drawn the voltage does not change.
     pub fn set_battery_charge(&mut self, charge: f64) {
         self.battery.set_charge(charge);
         self.feed(0.0);
     }
 
-    /// How often the body has run into something.
+    /// How often the body has hit something.
     pub fn collisions(&self) -> u32 {
         self.contact.collisions()
     }
@@ -180,10 +193,10 @@ impl World {
         self.weave.worst()
     }
 
-    /// From now on so many things stand on edges of the warehouse, at random, and come and go.
+    /// From now on `count` things appear on random edges and disappear again.
     ///
     /// # Errors
-    /// Its ways are too short for a robot to turn beside a thing.
+    /// The edges are too short for a robot to turn beside a thing.
     pub fn scatter_obstacles(&mut self, count: u32, seed: u64) -> Result<(), WarehouseError> {
         if count > 0 {
             room_for_things(self.obstacles.side_cm())?;
@@ -192,10 +205,10 @@ impl World {
         Ok(())
     }
 
-    /// Puts a thing on an edge; one that stands there already stays.
+    /// Puts a thing on an edge; a thing that stands there already stays.
     ///
     /// # Errors
-    /// The warehouse has no such edge, its ways are too short, the robot is there, or too many
+    /// The warehouse has no such edge, its edges are too short, the robot is there, or too many
     /// things stand already.
     pub fn put_obstacle(&mut self, edge: Edge) -> Result<(), HandsOff> {
         self.obstacles.put(edge, &self.pose, &mut self.blocks)
@@ -209,7 +222,7 @@ impl World {
         self.obstacles.take(edge, &mut self.blocks)
     }
 
-    /// Counts changes of goods and obstacles: what a picture of the world must not miss.
+    /// Counts changes of goods and things, so that a publisher can see each of them.
     pub fn changes(&self) -> u64 {
         self.goods.changes() + self.obstacles.changes()
     }
@@ -239,12 +252,12 @@ impl World {
         self.servos.next_byte()
     }
 
-    /// Where the robot stands.
+    /// The robot's pose.
     pub fn pose(&self) -> Pose {
         self.pose
     }
 
-    /// Puts the robot somewhere, at rest.
+    /// Puts the robot at a pose, at rest.
     pub fn place(&mut self, pose: Pose) {
         self.pose = pose;
         self.contact.place(pose);
@@ -267,7 +280,7 @@ impl World {
         self.arm.1
     }
 
-    /// What is worth keeping.
+    /// The part of the world that is kept.
     pub fn state(&self) -> WorldState {
         WorldState {
             time: self.now(),
@@ -284,8 +297,8 @@ impl World {
         }
     }
 
-    /// Goes on from a kept state: time, pose, servos, goods, obstacles and
-    /// battery; the motors are off.
+    /// Goes on from a kept state: time, pose, servos, goods, obstacles and battery; the motors are
+    /// off.
     pub fn restore(&mut self, state: &WorldState) {
         self.now_ns = state.time.as_nanos() as u64 / Self::STEP_NS * Self::STEP_NS;
         self.pose = state.pose;
@@ -327,7 +340,7 @@ impl World {
         self.ir.step(self.now_ns, &self.pose, &self.blocks);
     }
 
-    /// The claw follows the servos; most of the time they stand.
+    /// Moves the claw with the servos; most of the time they stand still.
     fn move_claw(&mut self) {
         let positions = self.servos.positions();
         if positions != self.arm.0 {
@@ -335,14 +348,14 @@ impl World {
         }
     }
 
-    /// The battery feeds the motors.
+    /// Discharges the battery and sets the motors' supply.
     fn feed(&mut self, seconds: f64) {
         self.battery.step(seconds, self.duties);
         self.left.set_supply(self.battery.volts());
         self.right.set_supply(self.battery.volts());
     }
 
-    /// The body stops at what it cannot pass and pushes what it can.
+    /// Stops the body at obstacles, and lets it push goods.
     fn touch(&mut self, seconds: f64) {
         let goods = self.goods.list_mut();
         let (pose, pushed) = self
@@ -413,11 +426,11 @@ mod tests {
         world.scatter_obstacles(40, 1).expect("there is room");
         let pose = drive_on(&mut world);
         assert_eq!(world.state().collisions, 1);
-        // On the second edge: before the robot nobody puts anything.
+        // On the second edge: nobody puts a thing in front of the robot.
         assert!((520.0..560.0).contains(&pose.x), "{pose:?}");
     }
 
-    /// Ten seconds straight ahead at the standard duty.
+    /// Drives straight ahead for ten seconds at the standard duty.
     fn drive_on(world: &mut World) -> Pose {
         world.set_motors(100, 100);
         world.advance_to(Duration::from_secs(10));

@@ -1,6 +1,7 @@
-//! The exit line walked along on its tape, as a follower would.
+//! Walks along the exit line on its tape, as a robot would that follows it.
 
 use core::f64::consts::PI;
+use lager_floor::Node;
 
 use lager_plant::tape::Tape;
 use lager_plant::{Curve, Exit, Pose, Warehouse, scene};
@@ -8,7 +9,7 @@ use lager_plant::{Curve, Exit, Pose, Warehouse, scene};
 #[test]
 fn curved_exits_have_no_gap_and_leave_the_warehouse_alone() {
     for curve in [Curve::Straight, Curve::Left, Curve::Right, Curve::S] {
-        for delivery in [[0, 0], [2, 0], [0, 2], [2, 2]] {
+        for delivery in [[0, 0], [2, 0], [0, 2], [2, 2]].map(Node::from) {
             let mut warehouse = Warehouse::builtin("small").unwrap();
             warehouse.delivery = delivery;
             warehouse.exit = Exit {
@@ -39,7 +40,7 @@ fn curved_exits_have_no_gap_and_leave_the_warehouse_alone() {
     }
 }
 
-/// Walks along the middle of the exit line as a follower with a short look-ahead would.
+/// Walks along the middle of the exit line with a short look-ahead. Returns the end and the length.
 fn walk(warehouse: &Warehouse, tape: &Tape) -> (Pose, f64) {
     let start = scene::start(warehouse);
     let mut at = Pose {

@@ -1,11 +1,11 @@
-//! A pty in place of a board's USB cable, under a fixed name.
+//! A pty with a fixed name, in place of a board's USB cable.
 //!
 //! ```text
 //!   bridge --open--> /run/.../sensor --link--> /dev/pts/7 <==kernel==> master, held here
 //! ```
-//! Like a USB adapter, the port carries nothing while nobody has it open, and what its reader
-//! does not fetch is lost; a write never waits. The link is replaced in one step, so that there is
-//! no moment without a port, and removed at the end if it is still ours.
+//! As with a USB adapter, the port carries nothing while nobody has it open, and bytes that its
+//! reader does not fetch are lost; a write never waits. The link is replaced in one step, so the
+//! port is never missing, and `drop` removes it if it is still ours.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -24,18 +24,18 @@ use thiserror::Error;
 /// Why a port could not be made.
 #[derive(Debug, Error)]
 pub enum PtyError {
-    /// The system gives no pty.
-    #[error("there is no pty to be had ({0}); is /dev/pts mounted, and is its limit reached?")]
+    /// The system cannot give a pty.
+    #[error("the system gives no pty ({0}); is /dev/pts mounted, and is its limit reached?")]
     Open(#[source] io::Error),
-    /// The link's place is taken.
-    #[error("{0} exists and is not a link; choose another place for the port")]
+    /// Something else is at the link's path.
+    #[error("{0} exists and is not a link; choose another path for the port")]
     Taken(PathBuf),
     /// The link cannot be made.
     #[error("cannot link the port at {path}: {source}; does its folder exist?")]
     Link {
-        /// Where the link should be.
+        /// The link's path.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }
@@ -50,10 +50,10 @@ pub struct Port {
 }
 
 impl Port {
-    /// A new port, linked at `link`. A link that is there already is replaced.
+    /// Makes a port and a link to it at `link`. An existing link is replaced.
     ///
     /// # Errors
-    /// There is no pty to be had, or `link` cannot be a link.
+    /// The system gives no pty, or `link` cannot be made.
     pub fn create(link: &Path) -> Result<Self, PtyError> {
         let (master, device) = open_master().map_err(|errno| PtyError::Open(errno.into()))?;
         let port = Self {
@@ -66,17 +66,17 @@ impl Port {
         Ok(port)
     }
 
-    /// Whether somebody has the port open, as far as the last look told.
+    /// Whether somebody had the port open at the last [`Port::look`].
     pub fn is_open(&self) -> bool {
         self.open
     }
 
-    /// What to wait on while the port is open.
+    /// The descriptor to wait on while the port is open.
     pub fn fd(&self) -> BorrowedFd<'_> {
         self.master.as_fd()
     }
 
-    /// Looks whether somebody has the port open.
+    /// Checks whether somebody has the port open.
     pub fn look(&mut self) {
         let mut fds = [PollFd::new(&self.master, PollFlags::IN)];
         let no_time = Timespec {
@@ -88,7 +88,7 @@ impl Port {
         }
         let open = !fds[0].revents().contains(PollFlags::HUP);
         if self.open && !open {
-            // What the last reader left must not greet the next one.
+            // The next reader must not get what the last one left.
             if let Ok(device) = ioctl_tiocgptpeer(&self.master, device_flags()) {
                 let _ = tcflush(&device, QueueSelector::IFlush);
             }
@@ -96,16 +96,16 @@ impl Port {
         self.open = open;
     }
 
-    /// Appends what was written to the port.
+    /// Appends the bytes that were written to the port.
     pub fn read(&self, into: &mut Vec<u8>) {
         let mut chunk = [0; 256];
-        // A closed port reads as an error once it is empty.
+        // An empty closed port reads as an error.
         while let Ok(count @ 1..) = rustix::io::read(&self.master, &mut chunk) {
             into.extend_from_slice(&chunk[..count]);
         }
     }
 
-    /// Sends bytes to whoever reads; returns how many were lost.
+    /// Sends bytes to the reader; returns how many were lost.
     pub fn write(&self, bytes: &[u8]) -> usize {
         if !self.open {
             return bytes.len();
@@ -146,13 +146,13 @@ impl Drop for Port {
     }
 }
 
-/// The bridge's end is opened without becoming anybody's terminal.
+/// Opening must not make the device this process's terminal.
 fn device_flags() -> OpenptFlags {
     OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC
 }
 
-/// A pty's master, not blocking, and the path of its device, which is raw: 8 bits, no echo, no
-/// line discipline.
+/// A pty's master, which does not block, and the path of its device, which is raw: 8 bits, no echo,
+/// no line discipline.
 fn open_master() -> Result<(OwnedFd, PathBuf), Errno> {
     let master = openpt(device_flags())?;
     grantpt(&master)?;
@@ -207,7 +207,7 @@ mod tests {
 
     fn read_all(port: &Port, wanted: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
-        // The kernel passes bytes on from a worker of its own.
+        // The kernel passes bytes on in a worker thread.
         while bytes.len() < wanted {
             port.read(&mut bytes);
             std::thread::yield_now();

@@ -1,6 +1,6 @@
-//! What the bridge knows of the two boards, in the form in which `link/health` shows it.
+//! What the bridge knows of the two boards, in the form of `link/health`.
 //!
-//! It is apart from the main loop because it outlives links and ports: a board keeps its counts
+//! It stands apart from the main loop because it outlives links and ports: a board keeps its counts
 //! of restarts, epochs and losses when it changes its port or the bridge is restarted.
 
 use std::sync::atomic::Ordering;
@@ -15,7 +15,7 @@ use crate::events::BoardUp;
 #[derive(Clone, Copy, Debug)]
 struct Board {
     health: BoardHealth,
-    /// The port it was found on last, 0 or 1.
+    /// The port where it was found last, 0 or 1.
     place: Option<usize>,
 }
 
@@ -26,7 +26,7 @@ pub(crate) struct Boards {
 }
 
 impl Boards {
-    /// Boards that have not been found, with the counts of an earlier life of the bridge.
+    /// No board found yet, with the counts of an earlier bridge.
     pub(crate) fn new(kept: Option<&Health>) -> Self {
         let board = |earlier: Option<&BoardHealth>| {
             let earlier = earlier.copied().unwrap_or_default();
@@ -48,13 +48,13 @@ impl Boards {
         }
     }
 
-    /// A board has come up on the port at `place`. A board that was found on another port before
-    /// has moved: the newest handshake counts.
+    /// A board has come up on the port at `place`. If it was on another port before, it has moved:
+    /// the newest handshake counts.
     pub(crate) fn up(&mut self, place: usize, baud: u32, board: &BoardUp) {
         let Some(index) = index(board.up.callsign) else {
             return;
         };
-        // The other board cannot be on this port any more.
+        // So the other board cannot be on this port any more.
         self.down(place);
         let Board { health, place: at } = &mut self.boards[index];
         *at = Some(place);
@@ -73,7 +73,7 @@ impl Boards {
         };
     }
 
-    /// The board on the port at `place` is not up any more; which board that was.
+    /// The board on the port at `place` is not up any more. Returns which board that was.
     pub(crate) fn down(&mut self, place: usize) -> Option<Callsign> {
         let index = self
             .boards
@@ -83,7 +83,7 @@ impl Boards {
         Some([Callsign::Sensor, Callsign::Steering][index])
     }
 
-    /// The port at `place` has gone with whatever was on it.
+    /// The port at `place` has gone, and its board with it.
     pub(crate) fn gone(&mut self, place: usize) {
         for board in &mut self.boards {
             if board.place == Some(place) {
@@ -106,12 +106,12 @@ impl Boards {
             .find(|callsign| self.place(*callsign) == Some(place))
     }
 
-    /// Which life of its link a board is in.
+    /// The epoch of a board's link.
     pub(crate) fn epoch(&self, callsign: Callsign) -> u32 {
         index(callsign).map_or(0, |index| self.boards[index].health.epoch)
     }
 
-    /// The rules by which a board speaks, while it is up.
+    /// The version of the protocol that a board speaks, while it is up.
     pub(crate) fn version(&self, callsign: Callsign) -> Option<Version> {
         self.place(callsign)?;
         match self.boards[index(callsign)?].health.version {
@@ -121,7 +121,7 @@ impl Boards {
         }
     }
 
-    /// A board has told its own counters.
+    /// A board has reported its own counters.
     pub(crate) fn status(&mut self, place: usize, status: &BoardStatus) {
         let Some(index) = self.callsign(place).and_then(index) else {
             return;
@@ -137,7 +137,7 @@ impl Boards {
         health.board_longest_loop_100us = status.longest_loop_100us;
     }
 
-    /// Takes over what the readers have counted.
+    /// Takes over the counts of the readers.
     pub(crate) fn measure(&mut self, counts: &Counts) {
         for (board, lost) in self.boards.iter_mut().zip(&counts.lost) {
             board.health.lost_total = lost.load(Ordering::Relaxed);

@@ -1,21 +1,20 @@
-//! The robot's reset button and mode switch (B1, E14), as lines of a GPIO chip that a closed
-//! contact pulls to ground.
+//! The robot's reset button and mode switch (B1, E14). They are lines of a GPIO chip, which a
+//! closed contact pulls to ground.
 //!
 //! ```text
 //!   reset    open -> closed    the robot has been put on the delivery node
 //!   switch   open              manual mode
 //!            closed            autonomous mode
 //! ```
-//! - A switch's position is a mode and no toggle. What is seen first is the mode of a robot that
-//!   has just been started; a bridge that takes up an earlier one's state keeps that mode until
-//!   somebody moves the switch. Others may change the mode meanwhile, and the next movement of the
-//!   switch counts again.
-//! - A press that is read a second late is not taken: whoever pressed has given it up.
-//! - The kernel debounces the lines, and dates each change by `CLOCK_MONOTONIC`.
-//! - A chip that cannot be had is no reason to end. It is tried again for ever, and the log says
-//!   so.
+//! - The switch's position is a mode; the switch does not toggle. Its first position sets the mode
+//!   of a robot that has just been started. A bridge that goes on from an earlier state keeps that
+//!   mode until somebody moves the switch. Others may change the mode meanwhile, and the next
+//!   movement of the switch counts again.
+//! - A press that is read a second late does not count: the person has given it up.
+//! - The kernel debounces the lines, and gives each change its time by `CLOCK_MONOTONIC`.
+//! - If a chip cannot be opened, the bridge goes on, logs it, and tries again for ever.
 //!
-//! The edge of this is [`Lines`]: whoever has no chip can move contacts there, as a test does.
+//! Below this stands [`Lines`]: on a machine without a chip, a test can move contacts there.
 
 use core::time::Duration;
 use std::io;
@@ -24,14 +23,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use gpiocdev::Request;
 use gpiocdev::line::{Bias, EdgeDetection, EdgeKind, Value};
-use lager_ports::Clock;
-use lager_topics::Mode;
+use lager_home::Clock;
+use lager_orders::Mode;
+use lager_orders::lease::LATEST_MOVE_NS;
 
-use crate::presses::LONGEST_NS;
-
-/// How often the wish to end is looked at.
+/// How often the thread checks whether the bridge ends.
 const LOOK: Duration = Duration::from_millis(100);
-/// How many looks pass before a chip that could not be had is tried again.
+/// After how many checks it tries again to open a chip.
 const LOOKS: u32 = 20;
 
 /// Which lines they are.
@@ -47,7 +45,7 @@ pub struct ButtonsConfig {
     pub debounce: Duration,
 }
 
-/// What a person has done.
+/// Something that a person has done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Touch {
     /// Pressed the reset button.
@@ -61,13 +59,13 @@ pub trait Lines {
     /// Whether the contact at this line is closed now.
     ///
     /// # Errors
-    /// The chip does not say.
+    /// The chip cannot be read.
     fn is_closed(&self, line: u32) -> io::Result<bool>;
 
     /// The next movement of a contact; `None` if there is none in this time.
     ///
     /// # Errors
-    /// The chip does not say.
+    /// The chip cannot be read.
     fn movement(&self, patience: Duration) -> io::Result<Option<Movement>>;
 }
 
@@ -76,21 +74,21 @@ pub trait Lines {
 pub struct Movement {
     /// The offset of its line.
     pub line: u32,
-    /// Whether it is closed since.
+    /// Whether it is closed since then.
     pub is_closed: bool,
     /// When, in ns of `CLOCK_MONOTONIC`.
     pub at_ns: u64,
 }
 
-/// How the lines of a configuration are had: [`open`], or what stands for it.
+/// Opens the lines of a configuration: [`open`], or a test's own function.
 pub type Opener = dyn Fn(&ButtonsConfig) -> io::Result<Box<dyn Lines>> + Send + Sync;
 
-/// What follows from contacts. It is pure.
+/// Turns movements of contacts into actions. Pure.
 #[derive(Clone, Copy, Debug)]
 struct Contacts {
-    /// The position of the switch that was seen last.
+    /// The last position of the switch.
     switch: Option<bool>,
-    /// The first position is the mode.
+    /// The first position sets the mode.
     is_first: bool,
 }
 
@@ -102,7 +100,7 @@ impl Contacts {
         }
     }
 
-    /// The switch is seen in this position.
+    /// The switch is in this position.
     fn switch(&mut self, is_closed: bool) -> Option<Touch> {
         let before = self.switch.replace(is_closed);
         let counts = match before {
@@ -116,14 +114,14 @@ impl Contacts {
         counts.then_some(Touch::Switched(mode))
     }
 
-    /// The reset button has moved; a press that is too old no longer counts.
+    /// The reset button has moved. A press that is too old does not count.
     fn reset(is_closed: bool, moved_ns: u64, now_ns: u64) -> Option<Touch> {
-        let is_fresh = moved_ns.abs_diff(now_ns) < LONGEST_NS;
+        let is_fresh = moved_ns.abs_diff(now_ns) <= LATEST_MOVE_NS;
         (is_closed && is_fresh).then_some(Touch::Reset)
     }
 }
 
-/// Hands on what people do, until `end`.
+/// Passes on what people do, until `end`.
 pub fn watch(
     config: &ButtonsConfig,
     open: &Opener,
@@ -141,7 +139,7 @@ pub fn watch(
         if complaints.is_power_of_two() {
             let chip = config.chip.display();
             tracing::error!(
-                "no button is heard: {chip}: {error}; `gpioinfo` of libgpiod shows which chips and \
+                "buttons do not work: {chip}: {error}; `gpioinfo` of libgpiod shows which chips and \
                  lines there are, and who uses them"
             );
         }
@@ -157,7 +155,7 @@ pub fn watch(
 /// The lines of a chip of this machine.
 ///
 /// # Errors
-/// The chip or a line of it cannot be had.
+/// The chip or one of its lines cannot be opened.
 pub fn open(config: &ButtonsConfig) -> io::Result<Box<dyn Lines>> {
     let lines: Vec<u32> = config.reset.into_iter().chain(config.switch).collect();
     let request = Request::builder()
@@ -252,7 +250,7 @@ mod tests {
         let now = 5_000_000_000;
         assert_eq!(Contacts::reset(true, now, now), Some(Touch::Reset));
         assert_eq!(Contacts::reset(false, now, now), None);
-        assert_eq!(Contacts::reset(true, now - LONGEST_NS, now), None);
+        assert_eq!(Contacts::reset(true, now - LATEST_MOVE_NS - 1, now), None);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How the last calibration of the line sensors went, as `link/health` tells it.
+//! The result of the last calibration of the line sensors, as `link/health` shows it.
 //!
 //! ```text
 //!                begun                      the board's second answer
@@ -7,10 +7,11 @@
 //!                           +-- the board falls silent or restarts --> broken off
 //! ```
 //!
-//! It is apart from the settings because the board answers a calibration twice: when it begins,
-//! which answers the request, and five seconds later when it ends, which no request in this process
-//! waits for. An end without a beginning belongs to a calibration that an earlier bridge began. In
-//! between it tells what the sensors read, one after the other.
+//! This file stands apart from the settings because the board answers a calibration twice. The
+//! first answer comes when it begins, and answers the request. The second comes five seconds later
+//! when it ends; no request waits for it. An end without a beginning belongs to a calibration that
+//! an earlier bridge began. Between the two the board says what the sensors read, one after the
+//! other.
 
 use lager_topics::{CalibratedSensor, Calibration as State, Health};
 use lager_wire::{LineReading, SettingReply, SettingStatus};
@@ -19,16 +20,16 @@ use lager_wire::{LineReading, SettingReply, SettingStatus};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Calibration {
     state: State,
-    /// Sensors that have a new threshold.
+    /// How many sensors have a new threshold.
     sensors: u8,
-    /// How many have ended, wrapping.
+    /// How many calibrations have ended, wrapping.
     ended: u8,
-    /// What each line sensor has read in it.
+    /// What each line sensor read.
     readings: [CalibratedSensor; 11],
 }
 
 impl Calibration {
-    /// As an earlier life of the bridge has told it.
+    /// As an earlier bridge published it.
     pub(crate) fn new(kept: Option<&Health>) -> Self {
         let kept = kept.copied().unwrap_or_default();
         Self {
@@ -45,7 +46,7 @@ impl Calibration {
         self.readings = Default::default();
     }
 
-    /// The board has told what one of the sensors reads.
+    /// The board has said what one of the sensors reads.
     pub(crate) fn hear_reading(&mut self, reading: &LineReading) {
         if let Some(sensor) = self.readings.get_mut(usize::from(reading.sensor)) {
             *sensor = CalibratedSensor {
@@ -57,10 +58,10 @@ impl Calibration {
         }
     }
 
-    /// The board has answered, and not for the first time.
+    /// The board has answered for the second time.
     pub(crate) fn hear(&mut self, reply: &SettingReply) {
         match (reply.status, reply.value) {
-            // The first answer once more.
+            // This repeats the first answer.
             (SettingStatus::Accepted, 1) => {}
             (SettingStatus::Accepted, sensors) => self.end(State::Done, sensors),
             (_, sensors) => self.end(State::Partly, sensors),

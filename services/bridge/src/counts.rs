@@ -1,7 +1,8 @@
-//! What the receiving ends of both ports count: written by their readers, shown by `link/health`.
+//! Counters of the receiving ends of both ports: their readers count, and `link/health` shows it.
 //!
-//! It is apart because a board may change its port: its epoch and its losses go with the board.
-//! The counters are atomic because each port has a thread of its own; nothing waits for them.
+//! They stand apart because a board may change its port: its epoch and its losses go with the
+//! board. The counters are atomic because each port has a thread of its own, and nothing waits for
+//! them.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -17,22 +18,22 @@ pub(crate) struct Meter {
     pub(crate) skipped_bytes: AtomicU32,
 }
 
-/// What both ports' readers count. It grows over the bridge's lives.
+/// The counts of both ports' readers. They grow over all lives of the bridge.
 #[derive(Debug, Default)]
 pub struct Counts {
     /// One per port.
     pub(crate) meters: [Meter; 2],
     /// The present link epoch of each board: sensor, steering.
     pub(crate) epochs: [AtomicU32; 2],
-    /// Packets each board's links have missed: sensor, steering. Unlike a meter's count it does
-    /// not begin at 0 with each epoch.
+    /// Packets that each board's links have missed: sensor, steering. A meter's count begins at 0
+    /// with each epoch; this count does not.
     pub(crate) lost: [AtomicU32; 2],
     /// Board data dropped because the main loop was behind.
     pub(crate) dropped: AtomicU32,
 }
 
 impl Counts {
-    /// Goes on from what an earlier life of the bridge has told.
+    /// Continues the counts of an earlier bridge.
     pub fn new(kept: Option<&Health>) -> Self {
         let counts = Self::default();
         let earlier = kept.map_or_else(Default::default, |kept| [kept.sensor, kept.steering]);
@@ -55,7 +56,7 @@ impl Counts {
     }
 }
 
-/// The place of a callsign in tables of two; `None` for what is no board.
+/// A board's place in tables of two; `None` if the callsign is not a board's.
 pub(crate) fn index(callsign: Callsign) -> Option<usize> {
     match callsign {
         Callsign::Sensor => Some(0),

@@ -1,47 +1,37 @@
-//! What happens at a port, as the bridge's core is told.
+//! The events of a port, for the bridge's core.
 //!
-//! Apart from the core and from the receiving end, which both use it.
+//! They stand apart from the core and from the receiving end because both use them.
 
-use core::time::Duration;
-
+use lager_orders::Moment;
 use lager_wire::link::Up;
 use lager_wire::{ArmData, BoardStatus, LineReading, SettingReply, SteerData, Version};
-
-/// A moment by both of the times the bridge goes by.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Moment {
-    /// Robot time: leases and deadlines.
-    pub robot: Duration,
-    /// The machine's `CLOCK_MONOTONIC` in ns: the stamps of samples and requests.
-    pub ns: u64,
-}
 
 /// A board that has come up, in the bridge's own count of epochs.
 #[derive(Clone, Copy, Debug)]
 pub struct BoardUp {
-    /// What the link says of it.
+    /// The link's own news.
     pub up: Up,
     /// The board's epoch over all lives of the bridge.
     pub link_epoch: u32,
 }
 
-/// What has happened at a port.
+/// Something has happened at a port.
 #[derive(Clone, Copy, Debug)]
 pub enum PortEvent {
     /// The port is open.
     Opened,
     /// The port has gone.
     Lost,
-    /// The board must be asked who it is.
+    /// The bridge must ask the board who it is.
     SendSyn,
-    /// The board's SYN must be answered.
+    /// The bridge must answer the board's SYN.
     SendAck {
-        /// The rules the board speaks by.
+        /// The version of the protocol that the board speaks.
         version: Version,
-        /// The board that has come up with it.
+        /// The board, if it has come up with this SYN.
         up: Option<BoardUp>,
     },
-    /// An original board was found running.
+    /// An original board was found that runs already.
     Adopt(BoardUp),
     /// The board has fallen silent.
     Silent,
@@ -60,4 +50,24 @@ pub enum PortEvent {
     Setting(SettingReply),
     /// What a line sensor reads while the line sensors are calibrated.
     Reading(LineReading),
+}
+
+impl PortEvent {
+    /// Whether the board's next report repeats this data, so that one may be missed.
+    #[must_use]
+    pub fn is_repeated(&self) -> bool {
+        match self {
+            Self::Steer { .. }
+            | Self::Arm(_)
+            | Self::Status(_)
+            | Self::Setting(_)
+            | Self::Reading(_) => true,
+            Self::Opened
+            | Self::Lost
+            | Self::SendSyn
+            | Self::SendAck { .. }
+            | Self::Adopt(_)
+            | Self::Silent => false,
+        }
+    }
 }

@@ -1,6 +1,6 @@
-//! From packets to samples: what belongs together on the bus but comes in several packets.
+//! Makes samples of packets: one sample may come in several packets.
 //!
-//! It is pure and apart from the threads, so that the simulation in one process makes the very
+//! It is pure and stands apart from the threads, so that the simulation in one process makes the
 //! same samples.
 
 use lager_topics::{LineFrame, SERVO_UNKNOWN, SteeringReport};
@@ -8,7 +8,7 @@ use lager_wire::{ArmData, LineBits, LineState, PacketId, SteerData};
 
 use crate::arbiter::Arbiter;
 
-/// Joins a line packet with the raw reading that a board with that setting sends right before it.
+/// Joins a line packet with the raw reading that a board may send just before it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LineAssembler {
     raw: Option<(PacketId, LineBits)>,
@@ -20,8 +20,8 @@ impl LineAssembler {
         self.raw = Some((id, bits));
     }
 
-    /// A line packet has come: the sample it makes. A raw reading counts only if it came in the
-    /// packet just before, so that a lost packet cannot pair two readings.
+    /// A line packet has come. Returns its sample. A raw reading counts only if it came in the
+    /// packet just before, so that a lost packet cannot join two moments.
     pub fn line(&mut self, id: PacketId, state: LineState, link_epoch: u32) -> LineFrame {
         let bits = match self.raw.take() {
             Some((raw_id, bits)) if raw_id.next() == id => bits.0,
@@ -36,7 +36,7 @@ impl LineAssembler {
     }
 }
 
-/// What was last heard of each servo.
+/// The last report of each servo.
 #[derive(Clone, Copy, Debug)]
 pub struct ServoTable {
     position: [u16; 8],
@@ -53,7 +53,7 @@ impl Default for ServoTable {
 }
 
 impl ServoTable {
-    /// A servo has reported; servos beyond the eighth are not the robot's.
+    /// A servo has reported. A ninth servo is not the robot's.
     pub fn hear(&mut self, data: &ArmData) {
         let index = usize::from(data.servo).wrapping_sub(1);
         if let Some(position) = self.position.get_mut(index) {
@@ -63,7 +63,7 @@ impl ServoTable {
     }
 }
 
-/// The sample a report of the steering board makes that came `age_ms` ago, in robot time.
+/// The sample of a report of the steering board that came `age_ms` ago, in robot time.
 pub fn steering_report(
     link_epoch: u32,
     data: &SteerData,

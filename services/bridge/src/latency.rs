@@ -1,8 +1,8 @@
-//! How long logic's orders take to the wire: what `latency/command` shows.
+//! How long logic's orders take to the wire, for `latency/command`.
 //!
-//! It is pure and apart from the main loop, because it has to be proven which orders count: it
-//! takes stamps and moments as arguments and reads no clock. Until an order is written it keeps
-//! only the times that came with it; nothing here allocates.
+//! It is pure and stands apart from the main loop, so that tests can prove which orders count:
+//! stamps and moments are arguments, and it reads no clock. Until an order is written it keeps only
+//! the order's times. Nothing here allocates.
 //!
 //! ```text
 //!   heard(order in force, its stamp)          written: measured
@@ -12,31 +12,32 @@
 //! ```
 
 use heapless::Vec;
-use lager_topics::{CommandLatency, SensorDistance, SensorLine, Stamp, SteeringCommand, Topic};
+use lager_sample::{Stamp, Topic};
+use lager_topics::{CommandLatency, SensorDistance, SensorLine, SteeringCommand};
 
 use crate::arbiter::OrderKey;
 
 /// How often the counts are published, in real ns.
 const PERIOD_NS: u64 = 1_000_000_000;
 
-/// Boundaries of the stages of one order's way, in ns of `CLOCK_MONOTONIC`: the frame read, the
-/// order published, the order received by the bridge.
+/// The times of one order's way, in ns of `CLOCK_MONOTONIC`: the frame was read, the order was
+/// published, the bridge received the order.
 type Times = [u64; 3];
 
-/// Counts the ways of orders that rest on sensor frames.
+/// Measures the orders that sensor frames have caused.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CommandMeter {
     counted: CommandLatency,
-    /// How long the orders of this turn took to the bridge, in ns.
+    /// How long the orders of this turn took to reach the bridge, in ns.
     received: Vec<u64, { SteeringCommand::QOS.buffer }>,
     under_way: Option<(OrderKey, Times)>,
     told_ns: u64,
 }
 
 impl CommandMeter {
-    /// An order was received from the bus at `received_ns`, and has been put in force as
-    /// `in_force`, or was a renewal or refused. One in force is measured to its write if a sensor
-    /// frame has caused it, and ends the measurement of the one before.
+    /// An order came from the bus at `received_ns`. It was put in force as `in_force`, or was a
+    /// renewal or was refused. If it is in force and a sensor frame caused it, it is measured up to
+    /// its write, and the measurement of the order before it ends.
     pub(crate) fn heard(&mut self, in_force: Option<OrderKey>, stamp: &Stamp, received_ns: u64) {
         let way = way(stamp, received_ns);
         if let Some(key) = in_force {
@@ -50,12 +51,12 @@ impl CommandMeter {
         }
     }
 
-    /// Whether the write of this order is to be measured.
+    /// Whether to measure the write of this order.
     pub(crate) fn is_waiting_for(&self, key: OrderKey) -> bool {
         self.under_way.is_some_and(|(waiting, _)| waiting == key)
     }
 
-    /// The order under way has been written.
+    /// The measured order has been written.
     pub(crate) fn written(&mut self, written_ns: u64) {
         if let Some((_, [read, _, received])) = self.under_way.take() {
             let counted = &mut self.counted;
@@ -65,8 +66,8 @@ impl CommandMeter {
         }
     }
 
-    /// The turn is over. An order that has not been written by now is held back for a reason of its
-    /// own.
+    /// The turn is over. If an order has not been written by now, the bridge holds it back for a
+    /// reason, and it is not measured.
     pub(crate) fn turn_over(&mut self) {
         self.under_way = None;
         for took in &self.received {
@@ -75,7 +76,7 @@ impl CommandMeter {
         self.received.clear();
     }
 
-    /// Whether it is time to publish the counts; then the next time is a second later.
+    /// Whether to publish the counts now; if so, the next time is a second later.
     pub(crate) fn is_due(&mut self, now_ns: u64) -> bool {
         let is_due = now_ns.saturating_sub(self.told_ns) >= PERIOD_NS;
         if is_due {
@@ -84,14 +85,14 @@ impl CommandMeter {
         is_due
     }
 
-    /// What was counted so far.
+    /// The counts so far.
     pub(crate) fn counted(&self) -> &CommandLatency {
         &self.counted
     }
 }
 
-/// The way of an order that rests on a sensor frame; `None` for any other, and for one whose times
-/// cannot be true.
+/// The times of an order that a sensor frame caused; `None` for any other, and for impossible
+/// times.
 fn way(stamp: &Stamp, received_ns: u64) -> Option<Times> {
     if ![SensorLine::ID, SensorDistance::ID].contains(&stamp.cause_topic) {
         return None;

@@ -14,19 +14,21 @@
 //!
 //! * [`arbiter`]: which origin may steer, as a pure state machine.
 //! * [`machine`]: every other decision of the bridge, around the arbiter and just as pure.
-//! * [`listener`]: the receiving end of one port, pure too. `lager simulate` runs both.
-//! * [`serial`]: a port, and what to do when it cannot be opened.
+//! * [`listener`]: the receiving end of one port, pure as well. `lager simulate` runs both.
+//! * [`serial`]: a port, and the errors if it cannot be opened.
 //! * [`frames`], [`settings`], [`profile`]: pure helpers between packets and samples.
 //! * [`buttons`]: the reset button and the mode switch of the robot.
 //! * `latency`: how long logic's orders take to the wire, for `latency/command`.
-//! * [`run`]: the shell with its three threads, and one more where there are buttons.
+//! * [`run`]: the shell with its three threads, and a fourth for the buttons.
 //!
 //! **Invariants:** no other process opens the ports. A reader thread never writes, and the main
-//! loop never reads. Everything that is written was decided by the arbiter, except for handshakes
-//! and settings. The bridge never decides where the robot goes.
+//! loop never reads. The arbiter decides everything that is written, except handshakes and
+//! settings. The bridge never decides where the robot goes. An original steering board has no limit
+//! on the age of a command, so the bridge sends it only standby, unless the configuration accepts
+//! that risk.
 //!
 //! The main loop publishes `steering/state`, because only the arbiter knows the end of an order.
-//! Line and distance frames are published by the reader thread directly.
+//! The reader thread publishes line and distance frames itself.
 
 pub mod arbiter;
 mod boards;
@@ -39,7 +41,6 @@ pub mod frames;
 mod latency;
 pub mod listener;
 pub mod machine;
-mod presses;
 pub mod profile;
 mod reader;
 mod resets;
@@ -49,5 +50,5 @@ pub mod settings;
 
 pub use config::BridgeConfig;
 pub use counts::Counts;
-pub use events::{BoardUp, Moment, PortEvent};
-pub use service::{run, run_with};
+pub use events::{BoardUp, PortEvent};
+pub use service::{BridgeError, run, run_with};

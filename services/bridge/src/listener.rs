@@ -1,28 +1,27 @@
-//! The receiving end of one port: bytes in; frames for the bus and events for the main loop out.
+//! The receiving end of one port: takes bytes, gives frames for the bus and events for the main
+//! loop.
 //!
-//! It is pure and apart from the reading thread, so that the simulation in one process hears the
-//! boards by the very same rules: which board may say what, which epoch a frame belongs to, and
-//! what counts as lost over all lives of the bridge. It never sends: what has to be answered it
-//! asks the main loop to send.
+//! It is pure and stands apart from the reading thread, so that the simulation in one process uses
+//! the same rules: which board may send what, which epoch a frame belongs to, and what counts as
+//! lost over all lives of the bridge. It never sends; it asks the main loop to send an answer.
 
 use core::time::Duration;
 use std::sync::atomic::Ordering;
 
+use lager_orders::Moment;
 use lager_topics::{DistanceFrame, LineFrame};
 use lager_wire::link::{HostEvent, HostLink, LinkCounters, Up};
 use lager_wire::{Callsign, Packet, Payload, Version};
 
 use crate::counts::{self, Counts};
-use crate::events::{BoardUp, Moment, PortEvent};
+use crate::events::{BoardUp, PortEvent};
 use crate::frames::LineAssembler;
 
-/// What has been heard at a port.
+/// Something that came from a port.
 #[derive(Clone, Copy, Debug)]
 pub enum Heard {
-    /// For the main loop, which must not miss it.
-    Link(PortEvent),
-    /// For the main loop, which may miss it: the board's next report repeats it.
-    Data(PortEvent),
+    /// For the main loop.
+    Event(PortEvent),
     /// For `sensor/line`.
     Line(LineFrame),
     /// For `sensor/distance`.
@@ -37,11 +36,11 @@ pub struct Listener {
     link: HostLink,
     /// The sensor board's frames, while it is up.
     frames: Option<Frames>,
-    /// How much of the present epoch's loss has been added to the board's total.
+    /// How much of the present epoch's loss is already in the board's total.
     lost_told: u32,
 }
 
-/// What makes frames of the sensor board's packets.
+/// Makes frames of the sensor board's packets.
 #[derive(Debug)]
 struct Frames {
     link_epoch: u32,
@@ -49,7 +48,7 @@ struct Frames {
 }
 
 impl Listener {
-    /// The end of the port at `place`, 0 or 1, before anything was heard.
+    /// The end of the port at `place`, 0 or 1, before any byte.
     pub fn new(place: usize) -> Self {
         Self {
             place,
@@ -66,25 +65,25 @@ impl Listener {
         self.take(event, at, counts)
     }
 
-    /// Events that need no byte, after all bytes that had come by `now` were pushed. Call it until
-    /// it returns nothing.
+    /// Events that need no byte. Push all bytes that had come by `now` first, and call this until it
+    /// returns nothing.
     pub fn poll(&mut self, now: Duration, counts: &Counts) -> Option<Heard> {
         let event = self.link.poll(now)?;
-        // No packet is among what comes without a byte.
+        // A packet never comes without a byte.
         self.take(event, Moment::default(), counts)
     }
 
-    /// When [`Listener::poll`] next has something to say if no byte comes.
+    /// When [`Listener::poll`] next returns something, if no byte comes.
     pub fn next_due(&self) -> Duration {
         self.link.next_due()
     }
 
-    /// How the link is doing in its present epoch.
+    /// The link's counters in its present epoch.
     pub fn health(&self) -> LinkCounters {
         self.link.health()
     }
 
-    /// Takes the link's counters over into `counts`.
+    /// Adds the link's counters to `counts`.
     pub fn measure(&self, counts: &Counts) {
         let health = self.link.health();
         let meter = &counts.meters[self.place];
@@ -98,7 +97,7 @@ impl Listener {
     }
 
     fn take(&mut self, event: HostEvent, at: Moment, counts: &Counts) -> Option<Heard> {
-        Some(Heard::Link(match event {
+        Some(Heard::Event(match event {
             HostEvent::SendSyn => PortEvent::SendSyn,
             HostEvent::SendAck { up } => {
                 let up = up.map(|up| self.come_up(up, counts));
@@ -124,7 +123,7 @@ impl Listener {
         let epoch = &counts.epochs[usize::from(up.callsign == Callsign::Steering)];
         let before = epoch.fetch_add(1, Ordering::Relaxed);
         let link_epoch = before.wrapping_add(1);
-        // A port that was opened anew, or an earlier bridge, has had it up before.
+        // A port that was opened again, or an earlier bridge, has seen it up before.
         let rebooted = up.rebooted || (up.fresh && before != 0);
         self.frames = (up.callsign == Callsign::Sensor).then(|| Frames {
             link_epoch,
@@ -135,7 +134,7 @@ impl Listener {
     }
 
     fn take_packet(&mut self, packet: &Packet, at: Moment) -> Option<Heard> {
-        let data = match (self.link.callsign()?, packet.payload) {
+        let event = match (self.link.callsign()?, packet.payload) {
             (Callsign::Sensor, Payload::RawLine(bits)) => {
                 self.frames.as_mut()?.lines.raw(packet.id, bits);
                 return None;
@@ -157,14 +156,14 @@ impl Listener {
             (Callsign::Steering, Payload::ArmData(data)) => PortEvent::Arm(data),
             (_, Payload::BoardStatus(status)) => PortEvent::Status(status),
             (_, Payload::SettingReply(reply)) => PortEvent::Setting(reply),
-            // A board does not send packets that only the Pi sends.
+            // Only the Pi sends these packets.
             _ => return None,
         };
-        Some(Heard::Data(data))
+        Some(Heard::Event(event))
     }
 
-    /// Adds to the board's total the losses that its link has found. A link finds a loss when a
-    /// packet comes, so none is forgotten when it begins a new epoch.
+    /// Adds the losses that the link has found to the board's total. A link finds a loss when a
+    /// packet comes, so no loss is forgotten when a new epoch begins.
     fn add_loss(&mut self, counts: &Counts) {
         let Some(board) = self.link.callsign().and_then(counts::index) else {
             return;

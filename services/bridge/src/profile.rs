@@ -1,5 +1,5 @@
-//! The arm's profile on its way to the steering board: told value by value, put in force as a
-//! whole, verified, and told again to a board that has come up.
+//! The arm's profile on its way to the steering board: sent value by value, put in force as a
+//! whole, verified, and sent again to a board that has come up.
 //!
 //! ```text
 //!            board up            every value and the check value taken
@@ -11,23 +11,19 @@
 //!
 //! One value is on its way at a time: a board's queue holds five packets, and at 9600 Bd a command
 //! to the wheels must not wait for twenty-five. Until the board has accepted the profile, the
-//! arbiter keeps the arm where it is: the board cannot hold limits that it has not been told.
+//! arbiter keeps the arm still, because the board cannot keep limits that it does not know.
 //!
-//! It is pure and apart from the other settings because it is one thing in many packets, which no
-//! request changes while the robot runs.
+//! It is pure. It stands apart from the other settings because it is one thing in many packets, and
+//! no request changes it while the robot runs.
 
 use core::time::Duration;
 
 use lager_topics::ArmProfileState;
 use lager_wire::{ArmProfile, Setting, SettingKey, SettingReply, SettingStatus, Version};
 
-/// Time for a board to answer before it is asked again.
-const RETRY: Duration = Duration::from_millis(60);
+use crate::settings::{RETRY, TRIES};
 
-/// How often a board is asked for one value.
-const TRIES: u8 = 4;
-
-/// How long a board that does not answer is left alone.
+/// How long the bridge waits before it tries a board again that does not answer.
 const PAUSE: Duration = Duration::from_secs(5);
 
 /// The profile and how much of it the board has taken.
@@ -43,7 +39,7 @@ pub struct ProfileTeller {
 }
 
 impl ProfileTeller {
-    /// Tells `profile`, which its owner has validated, to every board that comes up.
+    /// Sends `profile`, which its owner has validated, to every board that comes up.
     pub fn new(profile: &ArmProfile) -> Self {
         Self {
             values: profile.values(),
@@ -55,7 +51,7 @@ impl ProfileTeller {
         }
     }
 
-    /// The steering board has come up: it is told everything. An original board knows no profile.
+    /// The steering board has come up and gets everything. An original board knows no profile.
     pub fn board_up(&mut self, now: Duration, version: Version) {
         self.board_down();
         if version == Version::One {
@@ -71,7 +67,7 @@ impl ProfileTeller {
         self.next_try = None;
     }
 
-    /// What to send now, if anything.
+    /// The setting to send now, if any.
     pub fn poll(&mut self, now: Duration) -> Option<Setting> {
         if self.next_try.is_none_or(|due| due > now) {
             return None;
@@ -96,7 +92,7 @@ impl ProfileTeller {
         self.next_try
     }
 
-    /// The board has answered; whether that was the answer to a question under way.
+    /// The board has answered. Returns whether the bridge was waiting for this answer.
     pub fn answer(&mut self, now: Duration, reply: &SettingReply) -> bool {
         if self.next_try.is_none() || reply.key != self.key() || reply.seq != self.seq {
             return false;
@@ -115,7 +111,7 @@ impl ProfileTeller {
         true
     }
 
-    /// How far it has come.
+    /// The progress.
     pub fn state(&self) -> ArmProfileState {
         self.state
     }

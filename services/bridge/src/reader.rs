@@ -1,9 +1,9 @@
-//! One thread per serial port: reads, decodes, publishes what the sensor board sees, and hands
-//! the rest to the main loop.
+//! One thread for each serial port: reads, decodes, publishes the sensor board's frames, and passes
+//! everything else to the main loop.
 //!
-//! It is apart so that a sensor packet goes from the port to the bus without a second thread: one
-//! `read`, the decoder, one loaned sample. It never writes to the port; it asks the main loop to
-//! send an answer. Once a link is up it allocates nothing and holds no lock.
+//! It stands apart so that a sensor packet gets from the port to the bus without a second thread:
+//! one `read`, the decoder, one loaned sample. It never writes to the port; it asks the main loop
+//! to send an answer. Once a link is up it allocates nothing and holds no lock.
 //!
 //! ```text
 //!          open                  gone (unplugged, hung up)
@@ -18,28 +18,26 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 use heapless::spsc::Producer;
-use lager_ports::{Bus, Cause, Clock, PortError, Publisher, Ringer};
+use lager_home::Clock;
+use lager_orders::Moment;
+use lager_ports::{Bus, Cause, PortError, Publisher};
 use lager_topics::{DistanceFrame, LineFrame, SensorDistance, SensorLine};
+use lager_wake::Ringer;
 use lager_wire::Callsign;
 
 use crate::counts::Counts;
-use crate::events::{Moment, PortEvent};
+use crate::events::PortEvent;
 use crate::listener::{Heard, Listener};
 use crate::serial::{OpenPortError, PortGone, SerialPort};
 
-/// What a reader tells the main loop.
-#[derive(Debug)]
-pub(crate) enum FromReader {
-    /// The port is open; writing is the main loop's business.
-    Opened(Arc<SerialPort>),
-    /// What has happened at it.
-    Event(PortEvent),
-}
+/// A reader's message to the main loop: an event, and with [`PortEvent::Opened`] the port, because
+/// only the main loop writes.
+pub(crate) type Handed = (PortEvent, Option<Arc<SerialPort>>);
 
 /// How many events may wait for the main loop; a report comes every 5 ms.
 pub(crate) const QUEUE: usize = 64;
 
-/// Longest wait for bytes in real time: the reader looks for the stop flag that often.
+/// Longest wait for bytes in real time. The reader checks the stop flag that often.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Pauses between attempts to open a port, in real time.
@@ -56,7 +54,7 @@ pub(crate) struct Reader<'a> {
     baud: u32,
     bus: &'a Bus,
     clock: Clock,
-    events: Producer<'a, FromReader>,
+    events: Producer<'a, Handed>,
     ringer: Ringer,
     counts: &'a Counts,
     /// Set when the readers are to end.
@@ -64,8 +62,8 @@ pub(crate) struct Reader<'a> {
     sensor: SensorOut,
 }
 
-/// The sensor board's way to the bus. Its publishers stay through a reboot of the board, so that
-/// observers keep their count.
+/// Publishes the sensor board's frames. Its publishers stay when the board restarts, so that
+/// observers keep their counts.
 #[derive(Default)]
 struct SensorOut {
     ports: Option<SensorPorts>,
@@ -83,7 +81,7 @@ impl<'a> Reader<'a> {
         place: usize,
         (path, baud): (&'a Path, u32),
         bus: &'a Bus,
-        events: Producer<'a, FromReader>,
+        events: Producer<'a, Handed>,
         ringer: Ringer,
         (counts, end): (&'a Counts, &'a AtomicBool),
     ) -> Self {
@@ -101,14 +99,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Opens, listens, and opens again, until the stop flag is set.
+    /// Opens the port, listens, and opens it again, until the stop flag is set.
     pub(crate) fn run(mut self) {
         let mut pause = FIRST_PAUSE;
         let mut complaint = None;
         while !self.stopped() {
             match SerialPort::open(self.path, self.baud) {
                 Ok(port) => {
-                    // As long as the port is there; nothing is traced for a frame.
+                    // The span lasts as long as the port is there. No frame is traced.
                     let link = tracing::info_span!("link", port = %self.path.display());
                     let _link = link.entered();
                     tracing::info!(
@@ -120,13 +118,13 @@ impl<'a> Reader<'a> {
                     complaint = None;
                     pause = FIRST_PAUSE;
                     let port = Arc::new(port);
-                    self.hand(FromReader::Opened(Arc::clone(&port)));
+                    self.hand((PortEvent::Opened, Some(Arc::clone(&port))));
                     self.ringer.ring();
                     if let Err(gone) = self.listen(&port) {
                         tracing::warn!("the serial port {}: {gone}", self.path.display());
                     }
                     self.sensor = SensorOut::default();
-                    self.hand(FromReader::Event(PortEvent::Lost));
+                    self.hand((PortEvent::Lost, None));
                     self.ringer.ring();
                 }
                 Err(error) => self.complain(&mut complaint, error),
@@ -136,7 +134,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Says once what keeps the port from being opened, and again when it is something else.
+    /// Logs once why the port cannot be opened, and again when the reason changes.
     fn complain(&self, complaint: &mut Option<OpenPortError>, error: OpenPortError) {
         if complaint.as_ref() != Some(&error) {
             tracing::warn!("{error}");
@@ -148,8 +146,8 @@ impl<'a> Reader<'a> {
     fn listen(&mut self, port: &SerialPort) -> Result<(), PortGone> {
         let mut listener = Listener::new(self.place);
         let mut buffer = [0; 512];
-        // When everything that had come by then was read. A board counts as silent only as of such
-        // a moment: a reader that was kept from running finds the bytes first and then the time.
+        // The moment up to which all bytes were read. A board counts as silent only up to such a
+        // moment: a reader that could not run finds the bytes first and then the time.
         let mut heard = self.clock.now();
         while !self.stopped() {
             let mut ring = false;
@@ -188,10 +186,14 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Deals with what was heard; whether the main loop has something to do now.
+    /// Handles what was heard. Returns whether the main loop has something to do now.
     fn take(&mut self, heard: Heard, at_ns: u64) -> bool {
         match heard {
-            Heard::Link(event) => {
+            Heard::Event(event) if event.is_repeated() => {
+                offer(&mut self.events, event, &self.counts.dropped);
+                true
+            }
+            Heard::Event(event) => {
                 match event {
                     PortEvent::SendAck { up: Some(up), .. } | PortEvent::Adopt(up) => {
                         self.sensor.board_up(up.up.callsign);
@@ -199,12 +201,7 @@ impl<'a> Reader<'a> {
                     PortEvent::Silent => self.sensor = SensorOut::default(),
                     _ => {}
                 }
-                self.hand(FromReader::Event(event));
-                true
-            }
-            Heard::Data(event) => {
-                let event = FromReader::Event(event);
-                offer(&mut self.events, event, &self.counts.dropped);
+                self.hand((event, None));
                 true
             }
             Heard::Line(frame) => {
@@ -218,9 +215,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Hands over an event that must not be lost; waits while the main loop is behind.
-    fn hand(&mut self, event: FromReader) {
-        let mut event = event;
+    /// Passes on an event that must not be lost; waits while the main loop is behind.
+    fn hand(&mut self, mut event: Handed) {
         while let Err(refused) = self.events.enqueue(event) {
             if self.stopped() {
                 return;
@@ -235,7 +231,7 @@ impl<'a> Reader<'a> {
         self.end.load(Ordering::Acquire)
     }
 
-    /// Sleeps, but not past the stop flag.
+    /// Sleeps, but wakes for the stop flag.
     fn sleep(&self, pause: Duration) {
         let mut left = pause;
         while !left.is_zero() && !self.stopped() {
@@ -246,16 +242,16 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Hands over data that may be dropped when the main loop is stuck, since the next report repeats
-/// it; what is dropped is counted.
-fn offer(events: &mut Producer<'_, FromReader>, event: FromReader, dropped: &AtomicU32) {
-    if events.enqueue(event).is_err() {
+/// Passes on data that may be lost if the main loop hangs, because the next report repeats it. Lost
+/// data is counted.
+fn offer(events: &mut Producer<'_, Handed>, event: PortEvent, dropped: &AtomicU32) {
+    if events.enqueue((event, None)).is_err() {
         dropped.fetch_add(1, Ordering::Relaxed);
     }
 }
 
 impl SensorOut {
-    /// A board has come up; the sensor board's publishers stay where it was here before.
+    /// A board has come up. The sensor board's publishers stay if it was here before.
     fn board_up(&mut self, board: Callsign) {
         let ports = self.ports.take();
         *self = Self {
@@ -294,8 +290,8 @@ impl SensorOut {
         }
     }
 
-    /// Hands the frames of the last read to observers. Until then they would have been in the way
-    /// of the frames behind them.
+    /// Copies the frames of the last read to observers. Earlier, this would have delayed the frames
+    /// after them.
     fn catch_up(&mut self) {
         let Some(ports) = &self.ports else {
             return;
@@ -323,7 +319,7 @@ impl SensorOut {
     fn complain(&mut self, error: &dyn std::error::Error) {
         if !self.complained {
             self.complained = true;
-            tracing::error!("what the sensor board sends cannot be published: {error}");
+            tracing::error!("the sensor board's frames cannot be published: {error}");
         }
     }
 }
@@ -343,22 +339,18 @@ mod tests {
 
     use super::*;
 
-    fn silent() -> FromReader {
-        FromReader::Event(PortEvent::Silent)
-    }
-
     #[test]
     fn data_for_a_main_loop_that_is_behind_is_dropped_and_counted() {
-        let mut queue: Queue<FromReader, QUEUE> = Queue::new();
+        let mut queue: Queue<Handed, QUEUE> = Queue::new();
         let (mut events, mut taken) = queue.split();
         let dropped = AtomicU32::new(0);
         // The queue holds one less than its size.
         for _ in 0..QUEUE + 2 {
-            offer(&mut events, silent(), &dropped);
+            offer(&mut events, PortEvent::Silent, &dropped);
         }
         assert_eq!(dropped.load(Ordering::Relaxed), 3);
         assert!(taken.dequeue().is_some());
-        offer(&mut events, silent(), &dropped);
+        offer(&mut events, PortEvent::Silent, &dropped);
         assert_eq!(dropped.load(Ordering::Relaxed), 3);
     }
 }

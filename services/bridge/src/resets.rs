@@ -1,6 +1,7 @@
-//! Boards that keep resetting: a robot whose power or processor fails is not driven on.
+//! Finds boards that reset again and again: a robot whose power or processor fails must not drive.
 //!
-//! Pure, and apart from the arbiter because it counts both boards and latches nothing itself.
+//! Pure. It stands apart from the arbiter because it counts for both boards and sets no stop
+//! itself.
 
 use core::time::Duration;
 
@@ -8,7 +9,7 @@ use lager_wire::Callsign;
 
 use crate::counts;
 
-/// So many resets of one board within [`WINDOW`] are too many.
+/// This many resets of one board within [`WINDOW`] are too many.
 const TOO_MANY: usize = 3;
 
 /// In robot time.

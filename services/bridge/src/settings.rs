@@ -1,27 +1,27 @@
-//! Settings on their way to the boards: sent until the board answers, and sent again to a board
-//! that has restarted and forgotten them.
+//! Settings on their way to the boards: the bridge sends each until the board answers, and again to
+//! a board that has restarted and forgotten it.
 //!
-//! It is pure and apart from the main loop because it deals with time: tries, answers that fit no
-//! question, boards that come back. It knows nothing of ports and requests.
+//! It is pure. It stands apart from the main loop because it deals with time: attempts, answers
+//! that fit no question, boards that come back. It knows nothing of ports and requests.
 
 use core::time::Duration;
 
 use lager_topics::Health;
 use lager_wire::{Callsign, Setting, SettingKey, SettingReply, SettingStatus};
 
-/// Time for a board to answer before it is asked again.
-const RETRY: Duration = Duration::from_millis(60);
+/// How long a board may take to answer before the bridge asks again.
+pub(crate) const RETRY: Duration = Duration::from_millis(60);
 
 /// How often a board is asked.
-const TRIES: u8 = 4;
+pub(crate) const TRIES: u8 = 4;
 
-/// Longest time from [`Settings::want`] to an end, if the board's link is up.
-pub const LONGEST: Duration = Duration::from_millis(60 * 4);
+/// Longest time from [`Settings::want`] to a result, if the board's link is up.
+pub const LONGEST: Duration = RETRY.saturating_mul(TRIES as u32);
 
-/// How far a wish has come.
+/// The progress of a wish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// Nothing was wished, or it is on its way.
+    /// Nobody has a wish, or it is on its way.
     Pending,
     /// The board has taken it.
     Accepted,
@@ -36,9 +36,9 @@ pub enum Progress {
 struct Slot {
     key: SettingKey,
     wanted: i16,
-    /// The value the board has taken, to be told again after its restart.
+    /// The value that the board has taken; the bridge sends it again after the board's restart.
     kept: Option<i16>,
-    /// The value the board last said is in force.
+    /// The value that the board last reported as in force.
     in_force: Option<i16>,
     seq: u8,
     tries: u8,
@@ -86,7 +86,7 @@ fn home(key: SettingKey) -> Callsign {
 }
 
 impl Settings {
-    /// Takes up the gains that were set in an earlier life of the bridge.
+    /// Takes over the gains that were set in an earlier bridge.
     pub fn resume(&mut self, kept: &Health) {
         for (key, gain) in [
             (SettingKey::GainP, kept.gain_p),
@@ -106,19 +106,19 @@ impl Settings {
         health.gain_d = gain(SettingKey::GainD);
     }
 
-    /// Wishes a value, over any earlier wish for the same key.
+    /// Wishes a value. It replaces an earlier wish for the same key.
     pub fn want(&mut self, now: Duration, key: SettingKey, value: i16) {
         self.start(now, key, value);
     }
 
-    /// Sets a value that a board is sent whenever it comes up, from the next time on.
+    /// Sets a value that a board gets whenever it comes up, from the next time on.
     pub fn keep(&mut self, key: SettingKey, value: i16) {
         if let Some(slot) = self.slot(key) {
             slot.kept = Some(value);
         }
     }
 
-    /// A board has come up: it is told again what it had taken. What was under way is over.
+    /// A board has come up: it gets again what it had taken. Open wishes are over.
     pub fn board_up(&mut self, now: Duration, board: Callsign) {
         for index in 0..self.slots.len() {
             let slot = &mut self.slots[index];
@@ -135,7 +135,7 @@ impl Settings {
         }
     }
 
-    /// What to send to `board` now; ask again until there is nothing.
+    /// The setting to send to `board` now. Ask until it returns nothing.
     pub fn poll(&mut self, now: Duration, board: Callsign) -> Option<Setting> {
         for slot in self.slots.iter_mut().filter(|slot| home(slot.key) == board) {
             if slot.next_try.is_none_or(|due| due > now) {
@@ -166,7 +166,7 @@ impl Settings {
             .min()
     }
 
-    /// A board has answered. Returns whether that was the answer to a question under way. Any other
+    /// A board has answered. Returns whether the bridge was waiting for this answer. Any other
     /// answer changes nothing: it is a repetition, or the end of a calibration whose beginning was
     /// already answered.
     pub fn answer(&mut self, reply: &SettingReply) -> bool {
@@ -180,7 +180,7 @@ impl Settings {
         slot.in_force = Some(reply.value);
         if reply.status == SettingStatus::Accepted {
             slot.progress = Progress::Accepted;
-            // A calibration is done once, not again after a restart somewhere on the way.
+            // A calibration is done once, and not again after a restart.
             if slot.key != SettingKey::Calibrate {
                 slot.kept = Some(slot.wanted);
             }
@@ -190,13 +190,13 @@ impl Settings {
         true
     }
 
-    /// How far the last wish for a key has come.
+    /// The progress of the last wish for a key.
     pub fn progress(&self, key: SettingKey) -> Progress {
         self.find(key)
             .map_or(Progress::Unanswered, |slot| slot.progress)
     }
 
-    /// The value a board last said is in force.
+    /// The value that a board last reported as in force.
     pub fn in_force(&self, key: SettingKey) -> Option<i16> {
         self.find(key)?.in_force
     }

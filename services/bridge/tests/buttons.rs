@@ -8,7 +8,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use lager_bridge::buttons::{ButtonsConfig, Touch, open, watch};
-use lager_topics::Mode;
+use lager_orders::Mode;
 
 const SIMULATOR: &str = "/sys/kernel/config/gpio-sim";
 /// How long a touch is waited for before the test has failed.

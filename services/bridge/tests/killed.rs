@@ -12,15 +12,17 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use lager_bridge::BridgeConfig;
-use lager_ports::{Bus, Keeper, Shutdown};
+use lager_orders::Mode;
+use lager_ports::{Bus, Keeper};
 use lager_rig::process::run_if_asked;
 use lager_rig::{Parent, Process};
-use lager_topics::{Finish, LinkHealth, Mode, Role, SteeringOrder};
+use lager_topics::{Finish, LinkHealth, Role, SteeringOrder};
+use lager_wake::Shutdown;
 use rustix::process::{Pid, Signal, kill_process};
 
 use harness::{
-    Board, FOLLOW, Hands, Isolation, LEFT_PERP, PATIENCE, STANDBY, SensorBoard, SteeringBoard,
-    logic, wait_until,
+    FOLLOW, Hands, Isolation, LEFT_PERP, PATIENCE, Plugged, SPEED, STANDBY, SensorBoard,
+    SteeringBoard, logic, wait_until,
 };
 
 fn main() {
@@ -63,16 +65,20 @@ struct Scene {
     keeper: Keeper<LinkHealth>,
     supervisor: Bus,
     hands: Hands,
-    steering: Board<SteeringBoard>,
-    _sensor: Board<SensorBoard>,
+    steering: Plugged<SteeringBoard>,
+    _sensor: Plugged<SensorBoard>,
     isolation: Isolation,
 }
 
 impl Scene {
     fn new() -> Self {
         let isolation = Isolation::new();
-        let sensor = Board::plugged(SensorBoard::new(), isolation.folder().join("sensor"));
-        let steering = Board::plugged(SteeringBoard::new(), isolation.folder().join("steering"));
+        let sensor = Plugged::new(SensorBoard::new(), isolation.folder().join("sensor"), SPEED);
+        let steering = Plugged::new(
+            SteeringBoard::new(),
+            isolation.folder().join("steering"),
+            SPEED,
+        );
         let supervisor = isolation.open(Role::Supervisor);
         Self {
             bridge: start(&isolation, false),
@@ -129,7 +135,7 @@ fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
     for round in 1..=6_u32 {
         // A turn takes 300 ms: the bridge dies before, in the middle and after it.
         let turn = logic(round * 10, LEFT_PERP);
-        let delay = Duration::from_millis(u64::from(round - 1) * 70).div_f64(harness::SPEED);
+        let delay = Duration::from_millis(u64::from(round - 1) * 70).div_f64(SPEED);
         let start = Instant::now();
         scene.renew_until(turn, "it is time to die", |scene| {
             scene.turns() == round as usize && start.elapsed() >= delay
@@ -197,7 +203,7 @@ fn a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older() {
         });
         // What came before is with the board by now.
         std::thread::sleep(Duration::from_millis(5));
-        let before = scene.steering.with(|board| board.executed.len());
+        let before = scene.steering.with(|board| board.register.executed.len());
         let stop = scene.hands.stop();
         for _ in 0..10 {
             id += 1;
@@ -210,7 +216,7 @@ fn a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older() {
         });
         let after = scene
             .steering
-            .with(|board| board.executed[before..].to_vec());
+            .with(|board| board.register.executed[before..].to_vec());
         assert!(
             after.iter().all(|code| *code == STANDBY.code()),
             "round {round}: {after:?}"

@@ -1,8 +1,8 @@
 //! The robot's side of the conversation (C1-C9), as a pure state machine: lines and samples in,
-//! [`Action`]s out, time an argument.
+//! [`Effect`]s out, time an argument.
 //!
-//! What is asked follows from what the robot is doing and nothing else, so a successor of a killed
-//! comm asks the same:
+//! Only the robot's state decides which question it asks. So the successor of a killed comm asks
+//! the same question:
 //!
 //! ```text
 //!   mode        what the robot does                     asked
@@ -18,60 +18,60 @@
 //!               anything else                           nothing
 //! ```
 //!
-//! - Nothing is asked before the bridge has told the mode. When it becomes manual the robot asks at
-//!   once (L436); an answer to what was held before is passed over.
-//! - The floor is asked for once; side and goods by each connection.
-//! - **Nothing moves late.** What moves the robot or lets it move is refused with a sentence when it
-//!   comes more than 200 ms after it was given, and `fetchprod` after 2 s. How old a line may be at
-//!   most, a peer that speaks the extension shows by repeating the clock that the robot puts into
-//!   its sign (`freshness.rs`). Any other peer's lines have no age: where this process was held up
-//!   and one of them may be waited for, comm closes the connection instead.
-//!   `styrcomm 1` makes the robot stand whenever it comes.
-//! - **A link that is lost makes the robot stand where it is driven through it.** A peer that speaks
-//!   the extension repeats its `lager` line whenever the robot repeats its own; 150 ms without a
-//!   word while something is carried out are a lost link. A peer that speaks only the document's
-//!   language may be silent as long as it likes, so there only the end of its connection counts,
-//!   which the kernel finds some 3 s after the last sign of the peer's machine.
-//! - In autonomous mode the document leaves open what a lost link means (AMB-49), so it is
-//!   configured ([`LinkLost`]): the order is carried out all the same, or logic is told to stand at
-//!   the next node until the link is there again.
+//! - The robot asks nothing before the bridge has told the mode. When the mode becomes manual it
+//!   asks at once (C4), and ignores an answer to its earlier question.
+//! - The robot asks for the floor once, and for side length and goods on each connection.
+//! - **Nothing moves late.** An order that moves the robot, or lets it move, is refused with a
+//!   sentence when it comes more than 200 ms after somebody gave it; an answer to `fetchprod` after
+//!   2 s. A peer that speaks the extension repeats the clock that the robot sends with its `lager`
+//!   line; from this comm knows how old a line may be (`freshness.rs`). The lines of any other peer
+//!   have no age: if this process was held up and may have such a line waiting, comm closes the
+//!   connection instead. `styrcomm 1` makes the robot stand whenever it comes.
+//! - **A lost link makes a robot stand that somebody drives through it.** A peer that speaks the
+//!   extension repeats its `lager` line whenever the robot repeats its own. If it says nothing for
+//!   150 ms while the robot carries something out, the link is lost. A peer that speaks only the
+//!   document's language may be silent for any time. There only the end of its connection counts;
+//!   the kernel finds it some 3 s after the last sign of the peer's machine.
+//! - The document does not say what a lost link means in autonomous mode (AMB-49), so the
+//!   configuration does ([`LinkLost`]): the robot carries out its order all the same, or logic
+//!   makes it stand at the next node until the link is there again.
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
-//!   commands among these are dropped. It is carried out even where comm was held up and has given
-//!   the link up before it was read.
-//! - The numbers of a connection's actions grow. An action whose number is not above the last one is
-//!   refused: it was heard before, or comes late.
-//! - What cannot be done is told in a `thought`, and asked again a little later.
-//! - A peer that answers at once is not asked without end: commands are asked for at most 1 000
-//!   times a second, anything else at most 5 times. An answer that took longer than that is
-//!   followed by the next question at once.
+//!   commands among these are dropped. It is carried out even if comm was held up and has given up
+//!   the link before it read the stop.
+//! - The numbers of a connection's actions grow. An action whose number is not greater than the
+//!   last one is refused: it was heard before, or comes late.
+//! - If the robot cannot do something, it says so in a `thought` and asks again a little later.
+//! - Even if a peer answers at once, the robot asks for commands at most 1 000 times a second, and
+//!   for anything else at most 5 times. If an answer takes longer than that, the next question
+//!   follows at once.
 //!
 //! A station that has answered the extension's first line is told states, events and lists besides
-//! (`telling.rs`), and its numbered actions are carried out and answered
-//! (`conversation/orders.rs`): what is waited for stands in `tasks.rs`, what moves the robot in
-//! `driving.rs`. No other peer hears anything of that.
+//! (`telling.rs`). Its numbered actions are carried out and answered (`conversation/orders.rs`);
+//! `lager-operator` knows what each waits for, and what moves the robot. No other peer hears
+//! anything of that.
 
 use core::ops::Range;
 use core::time::Duration;
 use std::collections::HashMap;
 
+use lager_floor::ProductId;
+use lager_lines::Name;
 use lager_lines::conversation::{Held, RobotLine, StationLine, StationLineError};
 use lager_lines::extension::{self, EventKind, Hello};
 use lager_lines::gag::{Answer, Query, Request};
 use lager_lines::splitter::LineError;
-use lager_lines::{LATEST, LATEST_MOVE, Name, ProductId, TooLate};
-use lager_topics::{Mode, Order, Phase, Role, WarehouseMap};
+use lager_operator::{Driving, For, Orders};
+use lager_orders::lease::{COMMAND, LATEST, LATEST_MOVE, TooLate};
+use lager_orders::{Code, Mode, Moment, Reason};
+use lager_topics::{Phase, Role, WarehouseMap};
 use lager_wire::OperatorCommand;
 
-use crate::action::Action;
-use crate::driving::{Driving, For};
-use crate::ids::Ids;
+use crate::effect::Effect;
 use crate::known::Known;
 use crate::lost::{LinkLost, Standing};
 use crate::map::Described;
 use crate::memory::Memory;
-use crate::moment::Moment;
 use crate::speech::Told;
-use crate::tasks::{Asker, Tasks};
 use crate::telling::Telling;
 
 mod freshness;
@@ -81,45 +81,54 @@ mod saying;
 
 use freshness::Freshness;
 
-/// In ns of real time: how often the extension's first line is repeated while something is carried
-/// out, and else. What comes counts as older by up to as much.
+/// How often the robot repeats the extension's first line: while it carries something out, and
+/// else. In ns of real time. A line counts as older by up to this time.
 const SIGN_MOVING: u64 = 25_000_000;
 const SIGN: u64 = 50_000_000;
-/// How long a peer that answers it may be silent while something is carried out, and else.
-const SILENT_MOVING: u64 = 150_000_000;
+/// How long a peer that answers it may be silent: while something is carried out, and else.
+const SILENT_MOVING: u64 = COMMAND.as_nanos() as u64;
 const SILENT: u64 = 5_000_000_000;
-/// When a question is asked again after an impossible answer, and at the earliest at all.
+/// How long after a question the robot asks the next one at the earliest; also after an impossible
+/// answer.
 const AGAIN: u64 = 200_000_000;
-/// When a further command is asked for at the earliest, however fast the peer has answered. One
-/// that takes this long for its answer waits for nothing.
+/// How long after a command the robot asks for the next one at the earliest, however fast the peer
+/// has answered. A peer that takes this long for its answer does not wait.
 ///
 /// On a busy machine with two cores comm took 54 % of one for a peer that answered 36 000 times a
-/// second. With this pace it takes 5.6 %, with one of 2 ms 3.8 %, and while nothing is answered
-/// 0.7 % (2026-11-24).
+/// second. With this pace it takes 5.6 %, with a pace of 2 ms 3.8 %, and 0.7 % without any answers
+/// (2026-11-24).
 const PACE: u64 = 1_000_000;
-/// In ns since the connection is there: from when to when a robot in manual mode that nobody has
-/// driven asks for the warehouse rather than for commands.
+/// In ns since the connection began: from when to when a robot in manual mode that nobody has
+/// driven asks for the warehouse, not for commands.
 const DESCRIBED: Range<u64> = 1_000_000_000..2_000_000_000;
-/// What is said to actions that a stop has ended.
-const STOPPED: &str = "the robot has been stopped";
-/// Stops whose confirmation is owed, at most.
+/// The answer to actions that a stop has ended.
+const STOPPED: Code = Code::Stopped;
+/// How many stops may wait for their confirmation.
 const MOST_STOPS: usize = 16;
+
+/// Where a wish comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asker {
+    /// An answer to a question of the document. It gets no reply.
+    Question,
+    /// An action with this number.
+    Action(u32),
+}
 
 /// The conversation.
 #[derive(Clone, Debug)]
 pub struct Conversation {
     name: Name,
-    actions: Vec<Action>,
-    /// The last moment at which it was looked after.
+    effects: Vec<Effect>,
+    /// The time of the last call.
     turned_ns: u64,
-    ids: Ids,
 
     is_up: bool,
     /// The peer has answered the extension's first line.
     is_extended: bool,
-    /// Nothing has been heard on this connection.
+    /// The peer has said nothing on this connection.
     is_fresh: bool,
-    /// The number of the last action that has come on it.
+    /// The number of the connection's last action.
     last_number: Option<u32>,
     up_ns: u64,
     heard_ns: u64,
@@ -128,25 +137,25 @@ pub struct Conversation {
     /// Somebody has driven the robot by answers of the document.
     is_driven: bool,
     held: Held,
-    /// Nothing is asked before.
+    /// No question before this time.
     ask_from_ns: u64,
-    /// What was asked last of this peer, and when.
+    /// The last question to this peer, and when it was asked.
     asked: Option<(Query, u64)>,
-    /// When the next question goes, where one is held back.
+    /// When the next question goes out, if one waits.
     asks_ns: Option<u64>,
     told: Told,
 
     warehouse: Described,
     known: Known,
-    /// What is told besides where the extension is spoken.
+    /// What only a peer with the extension is told.
     telling: Telling,
     /// What has happened lately.
     memory: Memory,
-    /// The services of the robot, and since when each lives, as their samples' stamps have it.
+    /// The services of the robot, and since when each lives, from their samples' stamps.
     lives: HashMap<Role, u64>,
-    tasks: Tasks,
+    orders: Orders<Asker>,
     driving: Driving,
-    /// Stops that are to be confirmed, and when they came.
+    /// Stops that wait for their confirmation, and when they came.
     stops: Vec<(u32, u64)>,
     /// What a lost link means in autonomous mode.
     standing: Standing,
@@ -154,14 +163,14 @@ pub struct Conversation {
 
 /// What happens to the connection.
 impl Conversation {
-    /// A conversation of the robot `name`; `kept` is the map that an earlier one has published.
+    /// A conversation of the robot `name`. `kept` is the map that an earlier conversation
+    /// published.
     pub fn new(name: Name, kept: Option<WarehouseMap>, link_lost: LinkLost) -> Self {
         let warehouse = kept.as_ref().map(Described::floor_of);
         Self {
             name,
-            actions: Vec::new(),
+            effects: Vec::new(),
             turned_ns: 0,
-            ids: Ids::default(),
             is_up: false,
             is_extended: false,
             is_fresh: false,
@@ -184,30 +193,29 @@ impl Conversation {
             telling: Telling::default(),
             memory: Memory::default(),
             lives: HashMap::new(),
-            tasks: Tasks::default(),
+            orders: Orders::default(),
             driving: Driving::default(),
             stops: Vec::new(),
             standing: Standing::new(link_lost),
         }
     }
 
-    /// What is to be done; it is then no longer here.
-    pub fn actions(&mut self) -> Vec<Action> {
-        core::mem::take(&mut self.actions)
+    /// Takes what is to be done, in the order of the decisions.
+    pub fn effects(&mut self) -> Vec<Effect> {
+        core::mem::take(&mut self.effects)
     }
 
-    /// When it wants to be looked after next, in robot time, if before its usual turn.
+    /// When it must be called next, in robot time, if earlier than its usual turn.
     pub fn due(&self) -> Option<Duration> {
         self.driving.due()
     }
 
-    /// When it wants to be looked after next to ask something, in ns of real time, if a question is
-    /// held back.
+    /// When it must be called next to ask a question, in ns of real time, if a question waits.
     pub const fn asks_ns(&self) -> Option<u64> {
         self.asks_ns
     }
 
-    /// A connection is there.
+    /// A connection has begun.
     pub fn connected(&mut self, now: Moment) {
         if self.up_ns != 0 {
             self.happened(now, EventKind::LinkBack, "");
@@ -225,7 +233,7 @@ impl Conversation {
         self.told = Told::default();
         self.warehouse.side = None;
         self.warehouse.products = None;
-        // Whether the peer reads more than a name behind it is not known yet.
+        // It is not known yet whether the peer reads more than a name in that line.
         self.sign(now, None);
     }
 
@@ -236,40 +244,37 @@ impl Conversation {
         }
         self.held.clear();
         self.stops.clear();
-        self.tasks.forget_actions();
+        self.orders.keep(|asker| asker == Asker::Question);
         self.driving.forget_actions();
-        self.stand(now, "the link is lost");
+        self.stand(now, Code::LinkLost);
     }
 
-    /// Time has passed. To be called before what has come since, at least every 20 ms.
+    /// Time has passed. Call this before everything that has come since, at least every 20 ms.
     pub fn turn(&mut self, now: Moment) {
         let pause = Duration::from_nanos(now.ns.saturating_sub(self.turned_ns));
         self.turned_ns = now.ns;
         if self.is_up && self.waits_for_what_is_old_after(pause) {
-            self.hang_up(
-                now,
-                "the robot was held up, so what it has not read may be old",
-            );
+            self.hang_up(now, Code::HeldUp);
         }
         if self.driving.is_over(now) {
-            let why = "the time of the last drive is over and nobody has renewed it";
-            self.stand(now, why);
-            self.think(why);
+            self.stand(now, Code::DriveOver);
+            self.think(Code::DriveOver);
         }
         let renewed = self.driving.renew(now.robot);
-        self.actions.extend(renewed.map(Action::Steer));
-        self.tasks.turn(now);
+        self.effects.extend(renewed.map(Effect::Steer));
+        // In the document's language nothing ends an order that was given.
+        self.orders.turn(now, |asker| asker != Asker::Question);
         self.settle();
         let told = self
             .standing
-            .tell(now, self.is_up, &self.known, &mut self.ids);
-        self.actions.extend(told.map(Action::Press));
+            .tell(now, self.is_up, &self.known, self.orders.ids());
+        self.effects.extend(told.map(Effect::Do));
         self.keep_up(now);
         self.ask(now);
     }
 
-    /// Lines have come, all that had arrived. Of those that are read after the link was given up
-    /// only a stop counts.
+    /// Lines have come, all that had arrived. If the link was given up before they were read, only
+    /// a stop among them counts.
     pub fn heard(&mut self, now: Moment, lines: &[Result<String, LineError>]) {
         let silent = Duration::from_nanos(now.ns.saturating_sub(self.heard_ns));
         self.freshness.after_silence(silent, self.is_extended);
@@ -294,7 +299,7 @@ impl Conversation {
                 Ok(Ok(line)) => self.take(now, line, is_stopped),
                 Ok(Err(error)) if self.is_fresh && error.is_of_nobody() => {}
                 Ok(Err(error)) => self.misread(now, &error),
-                Err(_) => return self.hang_up(now, "its lines cannot be read"),
+                Err(_) => return self.hang_up(now, Code::LinesUnread),
             }
             self.is_fresh = false;
         }
@@ -326,25 +331,23 @@ impl Conversation {
                     let late = self.freshness.late(now) + given;
                     self.carry_out(now, late, number, action, is_stopped);
                 } else {
-                    self.correct(
-                        now,
-                        "say `lager 1 <name>` before any other line of the extension",
-                    );
+                    self.correct(now, Code::HelloFirst);
                 }
             }
             StationLine::Answer(answer) => self.answered(now, answer, is_stopped),
         }
     }
 
-    /// Says what of a line cannot be read.
+    /// Says which part of a line cannot be read.
     fn misread(&mut self, now: Moment, error: &StationLineError) {
         let number = match error {
             StationLineError::Order(error) => error.number().filter(|_| self.is_extended),
             StationLineError::Hello(_) | StationLineError::Answer(_) => None,
         };
+        let why = Reason::new(Code::Misread, &[error]);
         match number {
-            Some(number) => self.reply(number, Err(error.to_string())),
-            None => self.correct(now, &error.to_string()),
+            Some(number) => self.reply(number, Err(why)),
+            None => self.correct(now, why),
         }
     }
 
@@ -357,8 +360,9 @@ impl Conversation {
             return;
         }
         let late = self.freshness.late(now);
-        if let Err(why) = TooLate::check(late, answer.latest()) {
-            return self.correct(now, &format!("{answer}: {why}"));
+        if let Err(TooLate(late)) = TooLate::check(late, answer.latest()) {
+            let why = Reason::new(Code::LateAnswer, &[&answer, &late.as_millis()]);
+            return self.correct(now, why);
         }
         match answer {
             Answer::SideLength(side) => self.warehouse.side = Some(side),
@@ -373,7 +377,7 @@ impl Conversation {
             Answer::Command(command) => {
                 self.is_driven = true;
                 if let Err(why) = self.command(now, late, command, For::Question) {
-                    self.correct(now, &why);
+                    self.correct(now, why);
                 }
             }
         }
@@ -385,13 +389,13 @@ impl Conversation {
                 let map = Box::new(map);
                 if self.known.map.as_ref() != Some(&map) {
                     self.known.map = Some(map.clone());
-                    self.actions.push(Action::Map(map));
+                    self.effects.push(Effect::Map(map));
                 }
             }
             Some(Err(why)) => {
-                // Either may be wrong.
+                // Either of the two may be wrong.
                 self.warehouse = Described::default();
-                self.correct(now, &why);
+                self.correct(now, why);
             }
             None => {}
         }
@@ -401,25 +405,32 @@ impl Conversation {
         let products = self.warehouse.products.iter();
         let mut known = products.flat_map(|products| products.as_slice());
         if !known.any(|one| one.id == product) {
-            return self.correct(now, &format!("there is no product {product}"));
+            return self.correct(now, Reason::new(Code::NoProduct, &[&product]));
         }
-        let order = Order {
-            id: self.ids.fresh(now),
-            product: product.get(),
-        };
-        self.tasks.order(now, Asker::Question, order);
+        let order = self.orders.ids().fresh(now.ns);
+        self.orders.order(now, Asker::Question, order, product);
     }
 
     fn press_picked(&mut self, now: Moment) {
-        let order = self.known.status.map_or(0, |status| status.order_id);
-        let id = self.ids.fresh(now);
-        self.tasks.picked(now, Asker::Question, id, order, false);
+        let picked = lager_orders::Action::Picked { force: false };
+        let seen = self.known.seen();
+        let begun = self
+            .orders
+            .give(now, Duration::ZERO, Asker::Question, picked, &seen);
+        if let Err(why) = begun {
+            self.correct(now, why);
+        }
     }
 }
 
-/// What follows from all of it.
+/// Decides what follows from the state and the lines.
 impl Conversation {
-    /// What the robot wants to know.
+    /// Whether an order that answered a question has not shown its effect yet.
+    fn is_ordering(&self) -> bool {
+        self.orders.ordering().any(|asker| asker == Asker::Question)
+    }
+
+    /// The question that the robot needs now.
     fn wanted(&self, now: Moment) -> Option<Query> {
         let unknown = self.warehouse.unknown();
         if self.known.mode()? == Mode::Manual {
@@ -434,15 +445,15 @@ impl Conversation {
         let status = self.known.status?;
         let phase = status.phase.get()?;
         if phase == Phase::Picking {
-            let waits = self.driving.is_running() || self.tasks.has_picked();
+            let waits = self.driving.is_running() || self.orders.has_picked();
             return (!waits).then_some(Query::Arm);
         }
-        // Logic would refuse the order, and the station would have told it in vain.
+        // Logic would refuse the order, and the station would have given it in vain.
         if phase == Phase::WaitingForMap || status.needs_reset() {
             return None;
         }
         let queue = self.known.queue?;
-        let is_idle = !self.tasks.has_order() && queue.under_way == 0 && queue.count == 0;
+        let is_idle = !self.is_ordering() && queue.under_way == 0 && queue.count == 0;
         is_idle.then_some(Query::Fetch)
     }
 
@@ -452,8 +463,8 @@ impl Conversation {
             return;
         }
         let Some(query) = self.wanted(now) else {
-            // A person at the robot may have ordered meanwhile. What the station answers all the
-            // same waits after that.
+            // A person at the robot may have given an order meanwhile. If the station still
+            // answers, its order waits after that one.
             if self.held.get() != Some(Query::Fetch) {
                 self.held.clear();
             }
@@ -472,7 +483,7 @@ impl Conversation {
         self.say(RobotLine::Request(Request::Query(query)));
     }
 
-    /// When `query` may be asked at the earliest, whatever was answered to the question before.
+    /// When the robot may ask `query` at the earliest, whatever the last answer was.
     fn paced_ns(&self, query: Query) -> u64 {
         let is_for_command = |query| matches!(query, Query::Wheels | Query::Arm);
         match self.asked {
@@ -482,7 +493,7 @@ impl Conversation {
         }
     }
 
-    /// Finds out whether the link is still there.
+    /// Checks whether the link is lost.
     fn keep_up(&mut self, now: Moment) {
         if !self.is_up || !self.is_extended {
             return;
@@ -493,14 +504,14 @@ impl Conversation {
             false => (SILENT, SIGN),
         };
         if silent >= most {
-            return self.hang_up(now, "the external computer has fallen silent");
+            return self.hang_up(now, Code::PeerSilent);
         }
         if now.ns.saturating_sub(self.signed_ns) >= period {
             self.sign(now, Some(now.clock_ms()));
         }
     }
 
-    /// Says the extension's first line, which a peer that knows it answers.
+    /// Says the extension's first line. A peer that knows it answers.
     fn sign(&mut self, now: Moment, clock_ms: Option<u64>) {
         self.signed_ns = now.ns;
         self.say(RobotLine::Hello(Hello {
@@ -510,7 +521,7 @@ impl Conversation {
         }));
     }
 
-    /// Whether an answer may have come meanwhile that moves the robot and whose age nobody knows.
+    /// Whether an answer of unknown age that moves the robot may have come meanwhile.
     fn waits_for_what_is_old_after(&self, pause: Duration) -> bool {
         let is_by_hand = self.known.mode() == Some(Mode::Manual);
         let most = match self.held.get() {
@@ -523,21 +534,21 @@ impl Conversation {
         pause > most
     }
 
-    fn hang_up(&mut self, now: Moment, why: &'static str) {
+    fn hang_up(&mut self, now: Moment, why: Code) {
         self.disconnected(now);
-        self.actions.push(Action::HangUp(why));
+        self.effects.push(Effect::HangUp(why.into()));
     }
 
-    /// Makes the robot stand where it is driven from here, without a latched stop. `why` is said to
-    /// the actions that this ends.
-    fn stand(&mut self, now: Moment, why: &str) {
+    /// Makes the robot stand if it is driven from here, without a stop. `why` is the answer to the
+    /// actions that end by this.
+    fn stand(&mut self, now: Moment, why: Code) {
         if self.driving.let_go(why) {
-            let id = self.ids.fresh(now);
+            let id = self.orders.ids().fresh(now.ns);
             let stop = OperatorCommand::Stop;
             let order = self
                 .driving
                 .begin(now, Duration::ZERO, id, stop, For::Question);
-            self.actions.push(Action::Steer(order));
+            self.effects.push(Effect::Steer(order));
         }
     }
 }

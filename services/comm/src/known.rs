@@ -1,13 +1,15 @@
-//! What the robot's other services have said last.
+//! The last samples of the robot's other services.
 
-use lager_ports::Stop;
+use lager_operator::Seen;
+use lager_orders::Mode;
+use lager_stop::Stop;
 use lager_topics::{
-    BlockedWays, DistanceFrame, Durations, Health, LineFrame, Mode, NavigatorStatus, OrderQueue,
-    Refusal, Route, SteeringReport, Truth, WarehouseMap,
+    BlockedWays, DistanceFrame, Durations, Health, LineFrame, NavigatorStatus, OrderQueue, Route,
+    SteeringReport, Truth, WarehouseMap,
 };
 use lager_wire::Version;
 
-/// The last sample of each topic that is told of. `None` has not been heard.
+/// The last sample of each topic that comm uses. `None`: no sample has come.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Known {
     pub(crate) health: Option<Health>,
@@ -16,22 +18,22 @@ pub(crate) struct Known {
     pub(crate) report: Option<SteeringReport>,
     pub(crate) route: Option<Box<Route>>,
     pub(crate) senses: Senses,
-    /// Somebody has told where it really is, so there is a world that can be asked.
+    /// Somebody has told where the robot really is, so there is a simulated world to ask.
     pub(crate) is_simulated: bool,
-    /// The warehouse as this process or one before it has published it.
+    /// The warehouse that this process or an earlier one has published.
     pub(crate) map: Option<Box<WarehouseMap>>,
 }
 
-/// What only a station that speaks the extension is told, each as far as it is new.
+/// New samples that only a station with the extension is told.
 #[derive(Clone, Debug, Default)]
 pub struct Senses {
     /// The line under the robot.
     pub line: Option<LineFrame>,
     /// What is in front of it.
     pub distance: Option<DistanceFrame>,
-    /// The ways on which something stands.
+    /// The ways that are blocked.
     pub blocks: Option<Box<BlockedWays>>,
-    /// How long sensor frames took until logic had decided, since logic was started.
+    /// How long sensor frames took until logic had decided, since logic started.
     pub latency: Option<Box<Durations>>,
     /// Where a simulated robot really is.
     pub truth: Option<Box<Truth>>,
@@ -48,33 +50,23 @@ impl Known {
         self.health.is_some_and(|health| health.stopped != 0)
     }
 
-    /// Which stop that is; 0 = none.
-    pub(crate) fn stop_word(&self) -> u64 {
-        self.health.map_or(0, |health| health.stop_word)
-    }
-
-    /// Why this stop is not released where another one is in force, as a sentence.
-    pub(crate) fn newer_stop(&self, named: u64) -> String {
-        match Stop::of_word(self.stop_word()).filter(|stop| stop.word() != named) {
-            Some(stop) => {
-                format!("a newer stop is set, {stop}; look at the robot and release that one")
-            }
-            // The bridge has seen it, and has not told it yet.
-            None => "a newer stop is set; look at the robot and release that one".to_owned(),
+    /// What an operator must know.
+    pub(crate) fn seen(&self) -> Seen {
+        let stop = self.health.map_or(0, |health| health.stop_word);
+        Seen {
+            health: self.health,
+            status: self.status,
+            queue: self.queue,
+            is_simulated: self.is_simulated,
+            stop: Stop::of_word(stop).map(|stop| stop.to_string()),
         }
     }
 
-    /// Whether the steering board tells what it does with its motors: an original one does not, and
-    /// the bridge shows in its place what it was told.
+    /// Whether the steering board reports what its motors do. An original board does not; the
+    /// bridge then shows the command that the board was sent.
     pub(crate) fn board_tells_duties(&self) -> bool {
         let original = Version::Original as u8;
         self.health
             .is_some_and(|health| health.steering.version != original)
-    }
-
-    /// Why nobody may move the robot now, if that is so.
-    pub(crate) fn blocked(&self) -> Option<Refusal> {
-        let why = self.health.and_then(|health| health.blocked.get());
-        why.filter(|why| *why != Refusal::None)
     }
 }

@@ -1,18 +1,17 @@
-//! The connection to the external computer: a thread that makes it, reads it, and makes it anew for
-//! ever.
+//! The connection to the external computer: a thread that makes it, reads it, and makes a new one
+//! after its end.
 //!
 //! ```text
 //!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, ± a quarter ──> connecting
 //! ```
 //!
-//! What it reads goes to the thread of the bus through a bounded channel, and rings that. Writing
-//! is the other thread's, which never waits: what the peer does not take stays with [`Link`],
-//! bounded. Of what only shows how things are the newest alone is kept, and goes after all that is
-//! said.
+//! The thread passes what it reads to the thread of the bus through a bounded channel, and rings
+//! there. The thread of the bus writes, and never waits: [`Link`] keeps what the peer does not
+//! take, up to a limit. Of states it keeps only the newest, and sends them after all other lines.
 //!
-//! Where the robot has a secret, a connection is up once both sides have proved that they know it
-//! (`proving.rs`). Who does not prove it is hung up on, and nothing that he says reaches the other
-//! thread.
+//! If the robot has a secret, a connection is up once both sides have proved that they know it
+//! (`proving.rs`). If the other side does not prove it, this thread hangs up, and the other thread
+//! gets none of its lines.
 
 use std::io;
 use std::net::{Shutdown as Direction, TcpStream, ToSocketAddrs};
@@ -23,10 +22,11 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use lager_home::Clock;
 use lager_lines::Name;
 use lager_lines::secret::Nonce;
 use lager_lines::splitter::{LineError, LineSplitter};
-use lager_ports::{Clock, Ringer};
+use lager_wake::Ringer;
 use rustix::net::{SendFlags, send, sockopt};
 use thiserror::Error;
 
@@ -36,33 +36,34 @@ use crate::telling::KINDS;
 
 /// How long one address may take to answer.
 const CONNECT: Duration = Duration::from_secs(2);
-/// The first pause between two tries, doubled up to the longest.
+/// The first pause between two attempts. Each pause is twice as long as the one before, up to the
+/// longest.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 /// The log names an address that cannot be reached when the pauses have become longer than this.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// A connection that lasted this long was good: the next pause is the first again.
+/// A connection that lasted this long was good: after it the pauses begin with the first again.
 const GOOD: Duration = Duration::from_secs(5);
 /// How long a station may take to prove itself.
 const PROOF: Duration = Duration::from_secs(5);
-/// How often a station's sentences are told at most.
+/// How often the log shows a station's sentences, at most.
 const SENTENCES: Duration = Duration::from_secs(1);
-/// How often a pause looks whether it is to end.
+/// How often a pause checks whether it must end.
 const GLANCE: Duration = Duration::from_millis(20);
-/// What the peer may leave unread, in bytes, before it is given up.
+/// How many bytes the peer may leave unread before the link closes.
 const MOST_UNREAD: usize = 64 * 1024;
-/// How many pieces of at most 4 KiB may be read that the other thread has not taken yet.
+/// How many pieces of at most 4 KiB may wait for the other thread.
 const PIECES: usize = 16;
-/// When the kernel begins to ask a silent peer's machine whether it is there, how often, and when
-/// it gives up. Seconds are the shortest that it counts in; a peer that speaks the extension is
-/// found silent long before.
+/// When the kernel first probes a silent peer's machine, how often, and when it gives up. A second
+/// is the shortest time that it can count. A peer that speaks the extension is found silent long
+/// before.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 const UNCONFIRMED_MS: u32 = 3_000;
 
-/// What has become of the connection.
+/// News of the connection.
 #[derive(Debug)]
 pub(crate) enum News {
-    /// It is there.
+    /// It is up.
     Up(TcpStream),
     /// Lines have come.
     Lines(Vec<Result<String, LineError>>),
@@ -70,21 +71,21 @@ pub(crate) enum News {
     Down(String),
 }
 
-/// Whom a robot connects to, and by what it proves who it is.
+/// The external computer to which a robot connects, and how the robot proves its name.
 #[derive(Clone, Debug)]
 pub(crate) struct Wanted {
     /// The external computer: host and port.
     pub(crate) station: String,
     /// The robot's name.
     pub(crate) robot: Name,
-    /// The file of its secret; it is read for each connection.
+    /// The file of its secret. It is read for each connection.
     pub(crate) secret: Option<PathBuf>,
 }
 
 /// Why there is no connection.
 #[derive(Debug, Error)]
 enum NoLink {
-    /// Nobody is reached.
+    /// The external computer cannot be reached.
     #[error("cannot reach the external computer at {at}: {error}")]
     Reach {
         /// Where.
@@ -92,7 +93,7 @@ enum NoLink {
         /// Why.
         error: io::Error,
     },
-    /// It is not the robot's station.
+    /// The peer is not the robot's station.
     #[error("{at} is not taken for this robot's external computer: {why}")]
     Unproved {
         /// Where.
@@ -100,10 +101,10 @@ enum NoLink {
         /// Why.
         why: Unproved,
     },
-    /// The robot's secret is not to be had.
+    /// The robot's secret cannot be read.
     #[error("the robot cannot prove who it is: {0}")]
     Secrets(#[from] SecretsError),
-    /// It is not in the file.
+    /// The file does not have it.
     #[error("the robot cannot prove who it is: {} holds no secret of {robot}", .path.display())]
     Nameless {
         /// Which.
@@ -119,7 +120,7 @@ pub(crate) struct Link {
     news: Receiver<News>,
     stream: Option<TcpStream>,
     unread: Vec<u8>,
-    /// The newest of each kind, until all that is said has been taken.
+    /// The newest state of each kind, until all other lines have been taken.
     shown: [Option<String>; KINDS],
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -129,7 +130,7 @@ impl Link {
     /// Connects from now on.
     ///
     /// # Errors
-    /// There is no thread for it.
+    /// The system gives no thread for it.
     pub(crate) fn new(wanted: Wanted, ringer: Ringer) -> io::Result<Self> {
         let ends = Arc::new(AtomicBool::new(false));
         let (to, news) = sync_channel(PIECES);
@@ -150,7 +151,7 @@ impl Link {
         })
     }
 
-    /// What has become of the connection since the last look.
+    /// The news of the connection since the last call.
     pub(crate) fn next(&mut self) -> Option<News> {
         let news = self.news.try_recv().ok()?;
         match &news {
@@ -172,7 +173,7 @@ impl Link {
         }
     }
 
-    /// Says a line, as far as the peer takes it at once.
+    /// Sends a line, as much as the peer takes at once.
     pub(crate) fn say(&mut self, line: &str) {
         if self.stream.is_some() {
             self.unread.extend_from_slice(line.as_bytes());
@@ -180,14 +181,14 @@ impl Link {
         }
     }
 
-    /// Shows how things are: in place of the line of this kind that the peer has not taken.
+    /// Sends a state. It replaces the state of this kind that the peer has not taken.
     pub(crate) fn show(&mut self, kind: usize, line: String) {
         if self.stream.is_some() {
             self.shown[kind] = Some(line);
         }
     }
 
-    /// Writes what waits, as far as the peer takes it.
+    /// Writes the lines that wait, as much as the peer takes.
     pub(crate) fn write(&mut self) {
         self.write_said();
         while self.stream.is_some() && self.unread.is_empty() {
@@ -207,7 +208,7 @@ impl Link {
                 Ok(count) => drop(self.unread.drain(..count)),
                 Err(rustix::io::Errno::INTR) => {}
                 Err(rustix::io::Errno::AGAIN) if self.unread.len() <= MOST_UNREAD => return,
-                // The reading thread finds its end.
+                // The reading thread finds the end of the connection.
                 Err(_) => return self.hang_up(),
             }
         }
@@ -224,11 +225,11 @@ impl Drop for Link {
                 let _ = thread.join();
                 return;
             }
-            // It waits for an address to answer, and ends when that has or the process does.
+            // The thread may wait for an address; it ends when that answers or the process ends.
             if start.elapsed() > FIRST_PAUSE {
                 return;
             }
-            // Or for a place in the channel, or is about to say that it is up.
+            // Or it waits for room in the channel, or is about to report the connection.
             if let Ok(News::Up(stream)) = self.news.recv_timeout(GLANCE) {
                 let _ = stream.shutdown(Direction::Both);
             }
@@ -244,7 +245,7 @@ struct Thread {
     ends: Arc<AtomicBool>,
 }
 
-/// A connection that is made, and what has been read of it.
+/// A new connection, and the bytes that have been read from it.
 struct Made {
     stream: TcpStream,
     splitter: LineSplitter,
@@ -269,21 +270,22 @@ impl Thread {
                 }
                 Err(error) => {
                     let why = error.to_string();
-                    // One that has just been started may not listen yet.
+                    // A station that has just started may not listen yet.
                     let is_early = matches!(error, NoLink::Reach { .. }) && pauses.next <= PATIENCE;
                     if said != why && !is_early {
-                        tracing::warn!("{why}; it is tried for ever");
+                        tracing::warn!("{why}; the robot tries again for ever");
                         said = why;
                     }
                 }
             }
-            // Parts of a second that nobody else has, so that many robots do not come back in step.
+            // Take parts of a second as a random number, so that many robots do not come back in
+            // step.
             let chance = Clock::monotonic_ns() / 1_000 % 1_000;
             self.wait(pauses.after(start.elapsed(), chance));
         }
     }
 
-    /// Connects, and where the robot has a secret lets both sides prove that they know it.
+    /// Connects. If the robot has a secret, both sides prove that they know it.
     fn make(&self) -> Result<Made, NoLink> {
         let failed = |error| NoLink::Reach {
             at: self.wanted.station.clone(),
@@ -391,7 +393,7 @@ impl Thread {
 }
 
 impl Made {
-    /// Waits for bytes, and keeps the lines that they end.
+    /// Waits for bytes, and keeps the complete lines.
     ///
     /// # Errors
     ///
@@ -415,7 +417,7 @@ impl Made {
     }
 }
 
-/// Lets both sides of a new connection prove themselves; lines behind the last one stay.
+/// Lets both sides of a new connection prove themselves. Keeps the lines after the proofs.
 fn prove(made: &mut Made, mut proving: Proving) -> io::Result<Result<(), Unproved>> {
     use std::io::Write as _;
     let until = Instant::now() + PROOF;
@@ -449,7 +451,7 @@ fn prove(made: &mut Made, mut proving: Proving) -> io::Result<Result<(), Unprove
     }
 }
 
-/// How long is waited between two tries.
+/// The pauses between attempts.
 #[derive(Debug)]
 struct Pauses {
     next: Duration,
@@ -462,8 +464,8 @@ impl Default for Pauses {
 }
 
 impl Pauses {
-    /// The pause after a try that took so long, with its connection if it made one: three to five
-    /// quarters of the one that is next, by `chance` of 0 to 999.
+    /// The pause after an attempt of this length, with its connection if it made one: three to five
+    /// quarters of the present pause; `chance` of 0 to 999 chooses.
     fn after(&mut self, lasted: Duration, chance: u64) -> Duration {
         if lasted >= GOOD {
             self.next = FIRST_PAUSE;

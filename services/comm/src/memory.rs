@@ -1,14 +1,15 @@
-//! What has happened lately, for a station that was not there, or that was started anew and has
-//! forgotten it. Each connection is told all of it; the station passes over what it knows.
+//! Keeps the latest events for a station that was not there, or that has started again and
+//! forgotten them. Comm tells all of them on each connection; the station ignores those that it
+//! knows.
 
 use std::collections::VecDeque;
 
 use lager_lines::extension::Report;
 
-/// So much is kept. All of it fits into what may wait for a peer.
+/// How much is kept. All of it fits into the queue for a peer.
 const MOST: usize = 150;
 
-/// Events and the values of thoughts, the oldest first, each with when it was, in ns of real time.
+/// Events and the values of thoughts, the oldest first, each with its time in ns of real time.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
     kept: VecDeque<(u64, Report)>,
@@ -22,7 +23,7 @@ impl Memory {
         self.kept.push_back((now_ns, report));
     }
 
-    /// All of it, as it is told at this moment.
+    /// All of it, with its age at this moment.
     pub(crate) fn told(&self, now_ns: u64) -> impl Iterator<Item = Report> {
         self.kept.iter().map(move |(at_ns, report)| Report::Past {
             ago_ms: now_ns.saturating_sub(*at_ns) / 1_000_000,

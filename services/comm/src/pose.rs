@@ -1,16 +1,17 @@
-//! Where the robot is between nodes, as the external computer is told it, and whether that is
-//! known.
+//! Computes for the external computer where the robot is between nodes, and whether anybody knows
+//! that.
 
 use lager_lines::extension::Degrees;
 use lager_topics::{NavigatorStatus, Phase, WarehouseMap};
 
-/// What the wheels may have turned by hand before nobody knows any more where the robot is, in
-/// duty × µs of both motors: some 2 cm.
+/// How far the wheels may turn by hand before nobody knows the robot's place any more, in duty × µs
+/// of both motors: some 2 cm.
 const KNOWN_BY_HAND: u64 = 50_000_000;
 
-/// How well a robot knows where it is when it sees a mark.
+/// How exactly a robot knows its place when it sees a mark.
 const UNSURE_AT_MARK_MM: u32 = 20;
-/// What part of the way since then its odometry may be wrong by: motors differ by a tenth.
+/// How far the odometry may be wrong, as a part of the way since the mark: motors differ by a
+/// tenth.
 const UNSURE_PART: u32 = 8;
 
 /// A place in the warehouse.
@@ -19,15 +20,15 @@ pub(crate) struct Pose {
     pub(crate) x_mm: i32,
     pub(crate) y_mm: i32,
     pub(crate) heading: Degrees,
-    /// How far it may be from there.
+    /// How far the robot may be from there.
     pub(crate) unsure_mm: u32,
 }
 
-/// Whether logic knows its place. `by_hand` is what the bridge says of the wheels in manual mode.
+/// Whether logic knows its place. `by_hand` is the bridge's count of the wheels in manual mode.
 pub(crate) fn is_known(status: &NavigatorStatus, by_hand: u64) -> bool {
     let is_nowhere = |phase| phase == Phase::WaitingForMap || status.needs_reset();
     let has_place = status.phase.get().is_some_and(|phase| !is_nowhere(phase));
-    // Nothing was ever heard: then nothing was driven that logic does not know of.
+    // No count has come, so nobody has driven without logic.
     let since = by_hand.saturating_sub(status.driven_by_hand);
     has_place && since < KNOWN_BY_HAND
 }
@@ -54,7 +55,7 @@ mod tests {
             travelled_mm: 150,
             turned_deg: 30,
             phase: phase.into(),
-            heading: lager_topics::Heading::Left.into(),
+            heading: lager_floor::Heading::Left.into(),
             ..NavigatorStatus::default()
         }
     }

@@ -1,5 +1,5 @@
-//! How a connection begins for a robot that has a secret: nothing is said or carried out there
-//! before robot and station have proved to each other that they know it. Pure: lines in, lines out.
+//! How a connection begins for a robot that has a secret: it says and carries out nothing before
+//! robot and station have proved to each other that they know it. Pure: lines in, lines out.
 //!
 //! ```text
 //!   > lager 1 r1 ──> waits ──< prove ──> > proof ──> waits ──< proved ──> proved
@@ -13,40 +13,40 @@ use lager_lines::extension::{Hello, Proof};
 use lager_lines::secret::{Meeting, Nonce, Secret, Side};
 use thiserror::Error;
 
-/// What begins every sentence of a station.
+/// Every sentence of a station begins with this.
 pub(crate) const THOUGHT: &str = "thought ";
 
-/// Why the peer is not taken for the robot's station.
+/// Why the robot does not accept the peer as its station.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub(crate) enum Unproved {
     /// It does not ask for a proof.
     #[error(
-        "it asks for no proof of who the robot is, so it knows no secret, and anybody may stand \
+        "it does not ask the robot for a proof, so it knows no secret, and anybody may stand \
          there; `lager station --robots-secret FILE` knows one"
     )]
     Unasked,
-    /// It does not know this secret.
-    #[error("it does not prove itself: it knows another secret than the robot")]
+    /// It knows another secret.
+    #[error("its proof is wrong: it knows another secret than the robot")]
     Wrong,
-    /// It says nothing of it.
+    /// It says nothing about a proof.
     #[error(
         "it has not proved in 5 s that it knows the robot's secret, as an external computer does \
          that speaks the document's language alone; a robot without a secret talks to one"
     )]
     Silent,
-    /// It says why.
+    /// It refuses the robot, for this reason.
     #[error("it refuses the robot: {0}")]
     Told(String),
 }
 
-/// What follows from a line.
+/// What to do after a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Step {
     /// Nothing.
     Wait,
-    /// This is said.
+    /// Send this line.
     Say(String),
-    /// It is the robot's station.
+    /// The peer is the robot's station.
     Proved,
 }
 
@@ -60,7 +60,7 @@ pub(crate) struct Proving {
 }
 
 impl Proving {
-    /// That of the robot by this name; `robots` is chosen for this connection alone.
+    /// For the robot of this name. `robots` is the robot's nonce, chosen for this connection alone.
     pub(crate) fn new(robot: Name, secret: Secret, robots: Nonce) -> Self {
         Self {
             robot,
@@ -70,7 +70,7 @@ impl Proving {
         }
     }
 
-    /// What is said first.
+    /// The first line.
     pub(crate) fn first(&self) -> String {
         let hello = Hello {
             version: Hello::VERSION,
@@ -80,11 +80,11 @@ impl Proving {
         line(&RobotLine::Hello(hello))
     }
 
-    /// The peer has said a line.
+    /// The peer has sent a line.
     ///
     /// # Errors
     ///
-    /// It is not the robot's station.
+    /// The peer is not the robot's station.
     pub(crate) fn heard(&mut self, said: &str) -> Result<Step, Unproved> {
         if let Some(why) = said.strip_prefix(THOUGHT) {
             return Err(Unproved::Told(shown(why)));
@@ -122,7 +122,7 @@ fn line(line: &impl core::fmt::Display) -> String {
     format!("{line}\n")
 }
 
-/// What a peer has said, as it may be shown in a terminal.
+/// A peer's text in a form that a terminal may show.
 pub(crate) fn shown(text: &str) -> String {
     text.replace(char::is_control, " ")
 }

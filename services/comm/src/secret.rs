@@ -1,4 +1,4 @@
-//! The file in which secrets lie: its owner's alone.
+//! Reads the file of secrets. Only its owner may read it.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _};
@@ -9,9 +9,9 @@ use lager_lines::secret::{SecretError, Secrets};
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-/// More than any list of secrets has, in bytes.
+/// The longest file, in bytes; no list of secrets is longer.
 const LONGEST: u64 = 64 * 1024;
-/// The rights that a file of secrets has: its owner's to read and to write.
+/// The mode of a file of secrets: only its owner may read and write.
 const RIGHTS: u32 = 0o600;
 
 /// Why a file gives no secrets.
@@ -26,7 +26,7 @@ pub enum SecretsError {
         error: io::Error,
     },
     /// It is not a file.
-    #[error("{} is no file, so it holds no secrets", .path.display())]
+    #[error("{} is not a file, so it holds no secrets", .path.display())]
     NoFile {
         /// Which.
         path: PathBuf,
@@ -43,13 +43,13 @@ pub enum SecretsError {
         /// Its mode.
         mode: u32,
     },
-    /// It is somebody else's.
+    /// It belongs to somebody else.
     #[error("{} belongs to another user, who could put other secrets in it", .path.display())]
     Owner {
         /// Which.
         path: PathBuf,
     },
-    /// It holds something else.
+    /// It does not hold secrets.
     #[error("{}: {error}", .path.display())]
     Misread {
         /// Which.
@@ -63,11 +63,11 @@ pub enum SecretsError {
 ///
 /// # Errors
 ///
-/// When it cannot be read, is another user's, may be read by others, or holds something else.
+/// It cannot be read, belongs to another user, others may read it, or it does not hold secrets.
 pub fn secrets_at(path: &Path) -> Result<Secrets, SecretsError> {
     let at = || path.to_owned();
     let failed = |error| SecretsError::Read { path: at(), error };
-    // A pipe that nobody writes to is not waited for.
+    // Do not wait for a pipe to which nobody writes.
     let flags = OFlags::NONBLOCK.bits().cast_signed();
     let open = OpenOptions::new().read(true).custom_flags(flags).open(path);
     let file: File = open.map_err(failed)?;

@@ -1,68 +1,68 @@
 //! The conversation's shell between the socket and the bus: it carries lines and samples and
 //! decides nothing.
 //!
-//! **Safe state**: silence. When this process ends, for whatever reason, its command is no longer
-//! renewed, and the bridge stops the robot when the lease is over, 120 ms later. Logic goes on with
-//! its orders.
+//! **Safe state**: silence. When this process ends, nobody renews its command any more, and the
+//! bridge stops the robot when the lease is over, 120 ms later. Logic goes on with its orders.
 //!
-//! Its turns run under a watch: each is a sign of life, and a call that does not return ends the
-//! process. `up` starts it again.
+//! A watchdog guards its turns. Each turn is a sign of life, and a call that does not return ends
+//! the process. `up` starts it again.
 
 use core::time::Duration;
 use std::path::PathBuf;
 
+use lager_home::Clock;
 use lager_lines::{MAX_LINE, Name, to_line};
-use lager_ports::{
-    Bus, Cause, Clock, Policy, PortError, Publisher, ReceiveError, Sample, SendError, Shutdown,
-    StopPage, StopWord, Subscriber, Waiter, Watchdog,
-};
+use lager_operator::Act;
+use lager_orders::{Code, Moment};
+use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, Sample, SendError, Subscriber};
+use lager_sample::{Request, Topic};
+use lager_stop::{StopPage, StopWord};
 use lager_topics::{
     BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,
-    NavBlocks, NavMap, NavRoute, NavStatus, OperatorInput, Request, Role, SensorDistance,
-    SensorLine, SteeringCommand, SteeringState, StopCause, Topic, TruthPose, WarehouseMap,
-    WorldRequest,
+    NavBlocks, NavMap, NavRoute, NavStatus, OperatorInput, Role, SensorDistance, SensorLine,
+    SteeringCommand, SteeringState, StopCause, TruthPose, WarehouseMap, WorldRequest,
 };
+use lager_wake::{Policy, Shutdown, Waiter, Watchdog};
 
-use crate::action::Action;
 use crate::asking::Asking;
 use crate::conversation::Conversation;
+use crate::effect::Effect;
 use crate::known::Senses;
 use crate::link::{Link, News, Wanted};
 use crate::lost::LinkLost;
-use crate::moment::Moment;
 use crate::telling;
 
-/// Longest wait for anything, in real time. Most samples do not ring comm, so that the path has no
-/// further process to wake.
+/// The longest wait for anything, in real time. Most samples do not wake comm, so that the path has
+/// no further process to wake.
 const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
-/// How long a predecessor's map is waited for, in real time.
+/// How long a new comm waits for the map of the one before, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
 
-/// Why a request is not put.
-const BUSY: &str = "too much is asked for at a time; try again";
+/// Why a request was not sent.
+const BUSY: Code = Code::TooMuchAsked;
 
-/// What comm is told when it starts.
+/// What comm is told at its start.
 #[derive(Clone, Debug)]
 pub struct CommConfig {
     /// The external computer: host and port.
     pub station: String,
-    /// What the robot calls itself towards it.
+    /// The robot's name for the external computer.
     pub name: Name,
-    /// The file of the secret by which both prove who they are. Without one the robot talks to
-    /// whoever answers there, as the document has it.
+    /// The file of the secret by which both recognise each other. Without one the robot believes
+    /// whoever answers there, as in the document.
     pub secret: Option<PathBuf>,
     /// What a lost link means in autonomous mode.
     pub link_lost: LinkLost,
-    /// Whether a predecessor's map is taken up.
+    /// Whether to take over the map of an earlier comm.
     pub resume: bool,
 }
 
-/// Runs the communication unit until `shutdown` is requested. `watchdog` watches its turns, and
-/// ends the process when one does not come to its end.
+/// Runs the communication unit until `shutdown` is requested. `watchdog` guards its turns, and ends
+/// the process when one hangs.
 ///
 /// # Errors
-/// Comm's place on the bus cannot be had; the sentence says what to do.
+/// Comm's ports on the bus cannot be opened; the sentence says what to do.
 pub fn run(
     bus: &Bus,
     config: &CommConfig,
@@ -70,7 +70,7 @@ pub fn run(
     shutdown: &Shutdown,
 ) -> Result<(), PortError> {
     let mut shell = Shell::new(&Opening { bus, watchdog }, config)?;
-    shutdown.wake(shell.waiter.ringer()?);
+    shutdown.wake(shell.waiter.ringer());
     while !shutdown.is_requested() {
         shell.turn();
     }
@@ -96,7 +96,7 @@ impl Opening<'_> {
 
     fn asking<R: Request>(&self, waiter: &Waiter) -> Result<Asking<R>, PortError> {
         self.watchdog.enter("opening a request");
-        Asking::new(self.bus, waiter.ringer()?)
+        Asking::new(self.bus, waiter.ringer())
     }
 }
 
@@ -151,7 +151,7 @@ impl Shell {
         };
         let mut shell = Self {
             clock: bus.clock(),
-            link: Link::new(wanted, waiter.ringer()?).map_err(|error| PortError::Thread {
+            link: Link::new(wanted, waiter.ringer()).map_err(|error| PortError::Thread {
                 what: "the link to the station",
                 fault: error.into(),
             })?,
@@ -160,7 +160,7 @@ impl Shell {
             waiter,
             watchdog: (*watchdog).clone(),
             conversation: Conversation::new(config.name.clone(), kept, config.link_lost),
-            stop_word: bus.place().folder_of(bus.robot()).join(StopPage::FILE),
+            stop_word: bus.home().folder_of(bus.unit()).join(StopPage::FILE),
             health: opening.subscriber()?,
             status: opening.subscriber()?,
             queue: opening.subscriber()?,
@@ -196,7 +196,7 @@ impl Shell {
         let now = self.now();
         self.conversation.turn(now);
         self.act();
-        // First what the robot does, so that lines find the conversation as it is now.
+        // First the robot's state, so that lines meet the conversation as it is now.
         self.take_samples(now);
         self.take_answers();
         self.take_lines(now);
@@ -204,7 +204,7 @@ impl Shell {
         self.link.write();
     }
 
-    /// How long there is nothing to do unless something comes, in real time.
+    /// How long to wait at most, in real time.
     fn longest_wait(&self) -> Duration {
         let due = self.conversation.due();
         let due = due.map(|due| self.clock.real(due.saturating_sub(self.clock.now())));
@@ -223,8 +223,7 @@ impl Shell {
 
     fn take_samples(&mut self, now: Moment) {
         if let Some(health) = self.next(|shell| shell.health.latest()) {
-            let since = health.stamp().epoch;
-            self.conversation.lives(now, Role::Bridge, since);
+            self.conversation.lives(now, Role::Bridge, health.stamp());
             self.conversation.health(now, &health);
         }
         if let Some(queue) = self.next(|shell| shell.queue.latest()) {
@@ -232,11 +231,10 @@ impl Shell {
         }
         if let Some(status) = self.next(|shell| shell.status.latest()) {
             let published_ns = status.stamp().publish_time_ns;
-            let since = status.stamp().epoch;
-            self.conversation.lives(now, Role::Logic, since);
+            self.conversation.lives(now, Role::Logic, status.stamp());
             self.conversation.status(now, &status, published_ns);
         }
-        // Before the events, some of which name the next node.
+        // Before the events, because some of them name the next node.
         if let Some(route) = self.next(|shell| shell.route.latest()) {
             self.conversation.route(&route);
         }
@@ -250,20 +248,19 @@ impl Shell {
             self.conversation.thought(&thought);
         }
         if self.conversation.is_to_tell(now) {
-            // As new as can be had.
+            // Read this last, so that it is as new as possible.
             self.take_senses();
             self.conversation.tell(now);
         }
     }
 
-    /// Takes what only a station hears that speaks the extension; the last sample of each is
-    /// enough.
+    /// Takes the samples that only a station with the extension is told; the last one of each topic
+    /// is enough.
     fn take_senses(&mut self) {
         let truth = self.next(|shell| shell.truth.latest());
         if let Some(truth) = &truth {
-            let since = truth.stamp().epoch;
             let now = self.now();
-            self.conversation.lives(now, Role::Simulator, since);
+            self.conversation.lives(now, Role::Simulator, truth.stamp());
         }
         let senses = Senses {
             line: self.next(|shell| shell.line.latest()).map(|line| *line),
@@ -278,7 +275,7 @@ impl Shell {
         self.conversation.senses(senses);
     }
 
-    /// Takes what has been answered to requests.
+    /// Takes the answers to requests.
     fn take_answers(&mut self) {
         while let Some((id, answer)) = self.bridge.answer() {
             self.conversation.answered_by_bridge(id, answer);
@@ -288,8 +285,8 @@ impl Shell {
         }
     }
 
-    /// Takes what has come over the link. All lines that have arrived are handed over at once, so
-    /// that a stop among them goes first.
+    /// Takes what has come over the link. It passes on all lines at once, so that a stop among them
+    /// goes first.
     fn take_lines(&mut self, now: Moment) {
         let mut lines = Vec::new();
         while let Some(news) = self.link.next() {
@@ -300,7 +297,7 @@ impl Shell {
                     self.conversation.connected(now);
                 }
                 News::Down(why) => {
-                    // Lines that came before the end are still carried out, a stop above all.
+                    // Lines that came before the end are still carried out, most of all a stop.
                     self.conversation.heard(now, &lines);
                     lines.clear();
                     tracing::info!("the external computer is away: {why}");
@@ -314,46 +311,46 @@ impl Shell {
     }
 
     fn act(&mut self) {
-        for action in self.conversation.actions() {
-            match action {
-                Action::Say(line) => match to_line(&line) {
+        for effect in self.conversation.effects() {
+            match effect {
+                Effect::Say(line) => match to_line(&line) {
                     Ok(line) => self.link.say(&line),
                     Err(error) => tracing::error!("more than {MAX_LINE} bytes: {error}"),
                 },
-                Action::Show(report) => match (telling::kind(&report), to_line(&report)) {
+                Effect::Show(report) => match (telling::kind(&report), to_line(&report)) {
                     (Some(kind), Ok(line)) => self.link.show(kind, line),
                     (None, Ok(line)) => self.link.say(&line),
                     (_, Err(error)) => tracing::error!("more than {MAX_LINE} bytes: {error}"),
                 },
-                Action::Ask { id, ask } => {
+                Effect::Do(Act::Ask { id, ask }) => {
                     if !self.bridge.ask(id, ask) {
                         self.conversation.answered_by_bridge(id, Err(BUSY.into()));
                     }
                 }
-                Action::AskWorld { id, ask } => {
+                Effect::Do(Act::AskWorld { id, ask }) => {
                     if !self.world.ask(id, ask) {
                         self.conversation
                             .answered_by_world(self.now(), id, &Err(BUSY.into()));
                     }
                 }
-                Action::HangUp(why) => {
+                Effect::HangUp(why) => {
                     tracing::info!("the connection is given up: {why}");
                     self.link.hang_up();
                 }
-                Action::Map(map) => self.publish_map(&map),
-                Action::Order(order) => {
+                Effect::Map(map) => self.publish_map(&map),
+                Effect::Do(Act::Order(order)) => {
                     let sent = self.orders.send(Cause::OWN, order);
                     self.check(sent);
                 }
-                Action::Press(input) => {
+                Effect::Do(Act::Press(input)) => {
                     let sent = self.inputs.send(Cause::OWN, input);
                     self.check(sent);
                 }
-                Action::Steer(order) => {
+                Effect::Steer(order) => {
                     let sent = self.commands.send(Cause::OWN, order);
                     self.check(sent);
                 }
-                Action::Stop => {
+                Effect::Stop => {
                     if let Err(error) =
                         StopWord::set(&self.stop_word, Role::Comm, StopCause::Ordered)
                     {

@@ -1,41 +1,43 @@
-//! What comm tells the station without being asked: thoughts, nodes and headings (G9, C8, L500).
+//! Comm's lines that answer no question: thoughts, nodes and headings (G9, C8).
 //!
-//! Node and heading are said when they change, and anew to every peer.
+//! It sends node and heading when they change, and again to every new peer.
 
+use lager_floor::{Heading, Node};
 use lager_lines::conversation::RobotLine;
 use lager_lines::gag::{Request, Telemetry};
-use lager_lines::{Coord, Direction, MAX_LINE, Text};
+use lager_lines::{MAX_LINE, Text};
+use lager_orders::Reason;
 
-/// What the peer was told last.
+/// The last node and heading that the peer was told.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Told {
-    node: Option<Coord>,
-    looks: Option<Direction>,
+    node: Option<Node>,
+    looks: Option<Heading>,
 }
 
 impl Told {
-    /// That the robot goes to `node`, if that is news.
-    pub(crate) fn node(&mut self, node: Coord) -> Option<RobotLine> {
+    /// The line that the robot goes to `node`, if that is news.
+    pub(crate) fn node(&mut self, node: Node) -> Option<RobotLine> {
         (self.node.replace(node) != Some(node)).then(|| telemetry(Telemetry::Robot(node)))
     }
 
-    /// That it looks to `looks`, if that is news.
-    pub(crate) fn looks(&mut self, looks: Direction) -> Option<RobotLine> {
+    /// The line that it looks to `looks`, if that is news.
+    pub(crate) fn looks(&mut self, looks: Heading) -> Option<RobotLine> {
         (self.looks.replace(looks) != Some(looks)).then(|| telemetry(Telemetry::Heading(looks)))
     }
 }
 
-/// A sentence, cut to what a line can carry.
+/// A sentence, cut to the length of a line.
 pub(crate) fn thought(sentence: &str) -> RobotLine {
     telemetry(Telemetry::Thought(cut(sentence, "thought ".len())))
 }
 
-/// Why an action is refused, likewise.
-pub(crate) fn reason(sentence: &str) -> Text {
-    cut(sentence, "refused 4294967295 ".len())
+/// A reason, cut to the length of a line.
+pub(crate) fn reason(reason: &Reason) -> Reason {
+    Reason::read(cut(reason.as_str(), "refused 4294967295 ".len()).as_str())
 }
 
-/// One line of a sentence that fits behind `before` bytes.
+/// The part of a sentence that fits into a line after `before` bytes.
 fn cut(sentence: &str, before: usize) -> Text {
     let mut one_line = sentence.replace(['\r', '\n'], " ");
     let most = MAX_LINE - before;

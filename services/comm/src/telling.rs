@@ -1,32 +1,33 @@
-//! What a station that speaks the extension is told of the robot: its state twenty times a second,
+//! Tells a station that speaks the extension how the robot is: its state twenty times a second,
 //! lists when they have changed, measurements when there are new ones.
 //!
-//! Each kind of report replaces one before it that the station has not taken, so nothing heaps up
-//! behind a slow one.
+//! Each kind of report replaces an earlier one that the station has not taken, so a slow station
+//! does not make a queue grow.
 
+use lager_floor::{Node, Place, ProductId};
 use lager_lines::extension::{
-    Block, Degrees, Edge, Event, EventKind, Latency, Listed, Loads, Mode, Pick, Queued, Report,
-    Servos, State, Thinks, TruePose,
+    Block, Degrees, Event, EventKind, Latency, Listed, Loads, Queued, Report, Servos, State,
+    Thinks, TruePose,
 };
-use lager_lines::{Coord, Name, ProductId, Text};
+use lager_lines::{Name, Text};
+use lager_orders::Moment;
+use lager_sample::{Coded, Tag};
 use lager_topics::{
-    BlockedWays, BoardHealth, CalibratedSensor, Calibration, Coded, Durations, Failure, Health,
-    LineFrame, Mode as BusMode, OrderQueue, Pick as BusPick, Remedy, Route, Tag, Thought, Truth,
+    BlockedWays, BoardHealth, CalibratedSensor, Calibration, Durations, Failure, Health, LineFrame,
+    OrderQueue, Remedy, Route, Thought, Truth,
 };
 use lager_wire::{Binary, LineBits, LineReading};
 
 use crate::known::{Known, Senses};
-use crate::map::direction;
-use crate::moment::Moment;
 use crate::pose;
 
 /// How often the state is told, in ns of real time.
 const PERIOD: u64 = 50_000_000;
 
-/// How old the steering board's words may be, in ms of robot time, before they are left out.
+/// Reports of the steering board that are older than this are left out, in ms of robot time.
 const LATEST_REPORT_MS: u16 = 500;
 
-/// When what was told, and what is to be told.
+/// What was told and when, and what to tell next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Telling {
     next_ns: u64,
@@ -36,24 +37,24 @@ pub(crate) struct Telling {
     obstacles: Option<Report>,
     gone: Option<Report>,
     sensors: Option<Report>,
-    /// What was counted when the latency was told last.
+    /// The counts at the last report of the latency.
     latency: Durations,
 }
 
 impl Telling {
-    /// A station has announced itself: it has been told nothing yet.
+    /// A station has announced itself, and has been told nothing yet.
     pub(crate) fn begin(&mut self) {
         *self = Self::default();
     }
 
-    /// Whether the state's time has come again.
+    /// Whether it is time for the state again.
     pub(crate) const fn is_due(&self, now: Moment) -> bool {
         now.ns >= self.next_ns
     }
 
-    /// What is to be told at this moment. What was measured is taken out of `known`.
+    /// The reports of this moment. Takes measurements out of `known`.
     pub(crate) fn reports(&mut self, now: Moment, known: &mut Known) -> Vec<Report> {
-        // A turn that comes late does not make those after it late.
+        // A late turn does not delay the turns after it.
         self.next_ns += PERIOD;
         if self.next_ns <= now.ns {
             self.next_ns = now.ns + PERIOD;
@@ -89,10 +90,10 @@ impl Telling {
     }
 }
 
-/// Kinds of reports of which a newer one replaces an older one.
+/// The kinds of reports that replace an earlier one of their kind.
 pub(crate) const KINDS: usize = 9;
 
-/// Which of the kinds a report is, the first to be told first; `None` where each counts.
+/// The kind of a report, the first to be sent first; `None` for reports that all count.
 pub(crate) const fn kind(report: &Report) -> Option<usize> {
     match report {
         Report::State(_) => Some(0),
@@ -109,11 +110,12 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         | Report::Refused { .. }
         | Report::Event(_)
         | Report::Past { .. }
-        | Report::Thinks(_) => None,
+        | Report::Thinks(_)
+        | Report::Because(_) => None,
     }
 }
 
-/// What has happened, if the language has a word for it.
+/// An event, if the language has a word for it.
 pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report> {
     use lager_topics::EventKind as Bus;
     let kind = match event.kind.get()? {
@@ -126,7 +128,7 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
         Bus::Failed => EventKind::Failed,
         Bus::WayBlocked => EventKind::WayBlocked,
     };
-    let passed = Coord {
+    let passed = Node {
         x: event.x,
         y: event.y,
     };
@@ -136,7 +138,7 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
     };
     let has_order = event.order_id != 0;
     let text = match kind {
-        EventKind::WayBlocked => direction(event.heading.get()?).as_str().to_owned(),
+        EventKind::WayBlocked => event.heading.get()?.as_str().to_owned(),
         _ if event.failure.is_none() => String::new(),
         _ => event.failure.to_string(),
     };
@@ -149,45 +151,45 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
     }))
 }
 
-/// That something has happened to the robot itself, wherever it is; `text` is the event's.
+/// An event of the robot itself, at no place; `text` is the event's text.
 pub(crate) fn happened(kind: EventKind, text: &str, known: &Known) -> Report {
     let passed = known.status.and_then(|status| {
         let (x, y) = (status.x.try_into().ok()?, status.y.try_into().ok()?);
-        Some(Coord { x, y })
+        Some(Node { x, y })
     });
     Report::Event(Event {
         kind,
-        node: passed.unwrap_or(Coord { x: 0, y: 0 }),
+        node: passed.unwrap_or(Node { x: 0, y: 0 }),
         order: None,
         product: None,
         text: Text::new(text.to_owned()).unwrap_or_default(),
     })
 }
 
-/// What of a stop is told as it begins: its cause and who has set it.
+/// The text of a stop's event: its cause, and who has set it.
 pub(crate) fn stop_words(health: &Health) -> String {
     let words = [word(health.stop_cause), word(health.stop_origin)];
     let words = words.map(|word| word.map_or_else(|| "-".to_owned(), |word| word.to_string()));
     words.join(" ")
 }
 
-/// A thought in values. Those that its kind does not fill mean nothing.
+/// A thought in values. Values that its kind does not use mean nothing.
 pub(crate) fn thinks(thought: &Thought) -> Report {
     let failure = Some(thought.failure).filter(|failure| !failure.is_none());
     Report::Thinks(Box::new(Thinks {
         kind: word(thought.kind),
-        node: Some(Coord {
+        node: Some(Node {
             x: thought.x,
             y: thought.y,
         }),
-        looks: thought.heading.get().map(direction),
+        looks: thought.heading.get(),
         joint: word(thought.joint),
         sides: Some(thought.sides),
         product: ProductId::new(thought.product),
         expected: Some(thought.expected),
         seen: Some(thought.seen),
         failure: failure.and_then(|failure| word(failure.kind)),
-        failure_node: failure.map(|Failure { x, y, .. }| Coord { x, y }),
+        failure_node: failure.map(|Failure { x, y, .. }| Node { x, y }),
         failure_expected: failure.map(|failure| failure.expected),
         failure_seen: failure.map(|failure| failure.seen),
         remedy: failure.and_then(|failure| word(failure.remedy)),
@@ -198,7 +200,7 @@ fn state(now: Moment, known: &Known) -> State {
     let mut state = State {
         time_ms: u64::try_from(now.robot.as_millis()).ok(),
         next: known.route.as_deref().and_then(next),
-        mode: known.mode().map(mode),
+        mode: known.mode(),
         ..State::default()
     };
     put_health(&mut state, known);
@@ -218,7 +220,7 @@ fn put_health(state: &mut State, known: &Known) {
     state.steering_lost = Some(health.steering.lost_total);
     let missed = known.status.map_or(0, |status| status.frames_lost);
     state.bus_lost = Some(health.bus_lost.saturating_add(missed));
-    // Those that were never set are not known.
+    // Gains that nobody has ever set are not known.
     state.gain_p = u8::try_from(health.gain_p).ok();
     state.gain_d = u8::try_from(health.gain_d).ok();
 }
@@ -238,7 +240,7 @@ fn put_place(state: &mut State, known: &Known) {
     let Some(status) = &known.status else { return };
     state.phase = word(status.phase);
     state.hold = word(status.hold);
-    state.pick = status.pick.get().map(pick);
+    state.pick = status.pick.get();
     let remedy = Some(status.remedy).filter(|remedy| *remedy != Remedy::None);
     state.remedy = remedy.and_then(word);
     if !status.failure.is_none() {
@@ -251,9 +253,9 @@ fn put_place(state: &mut State, known: &Known) {
         return;
     }
     if let (Ok(x), Ok(y)) = (u8::try_from(status.x), u8::try_from(status.y)) {
-        state.node = Some(Coord { x, y });
+        state.node = Some(Node { x, y });
     }
-    state.looks = status.heading.get().map(direction);
+    state.looks = status.heading.get();
     let map = known.map.as_deref().filter(|map| map.side_length_cm > 0);
     if let Some(pose) = map.and_then(|map| pose::pose(status, map)) {
         state.x_mm = Some(pose.x_mm);
@@ -271,7 +273,7 @@ fn put_mission(state: &mut State, known: &Known) {
     }
 }
 
-/// What the boards see and do, as far as they are heard.
+/// What the boards see and do, as far as they report.
 fn put_boards(state: &mut State, known: &Known) {
     let is_heard = |up: Option<bool>| up == Some(true);
     if is_heard(state.sensor_up) {
@@ -302,36 +304,15 @@ fn is_up(board: &BoardHealth) -> bool {
     board.up != 0
 }
 
-const fn pick(pick: BusPick) -> Pick {
-    match pick {
-        BusPick::Manual => Pick::Manual,
-        BusPick::Auto => Pick::Auto,
-    }
-}
-
-pub(crate) const fn mode(mode: BusMode) -> Mode {
-    match mode {
-        BusMode::Manual => Mode::Manual,
-        BusMode::Autonomous => Mode::Autonomous,
-    }
-}
-
-/// `WaitingForOrder` as `waiting_for_order`.
+/// Turns `WaitingForOrder` into `waiting_for_order`.
 fn word<T: Coded>(tag: Tag<T>) -> Option<Name> {
-    let mut name = String::new();
-    for letter in tag.get()?.name().chars() {
-        if letter.is_ascii_uppercase() && !name.is_empty() {
-            name.push('_');
-        }
-        name.push(letter.to_ascii_lowercase());
-    }
-    Name::new(name).ok()
+    Name::new(lager_topics::word(tag)?).ok()
 }
 
 /// The node it goes to.
-fn next(route: &Route) -> Option<Coord> {
+fn next(route: &Route) -> Option<Node> {
     let node = route.nodes().first()?;
-    Some(Coord {
+    Some(Node {
         x: node.x,
         y: node.y,
     })
@@ -339,22 +320,19 @@ fn next(route: &Route) -> Option<Coord> {
 
 fn route(route: &Route) -> Report {
     let nodes = route.nodes().iter();
-    let nodes: Vec<Coord> = nodes
-        .map(|node| Coord {
+    let nodes: Vec<Node> = nodes
+        .map(|node| Node {
             x: node.x,
             y: node.y,
         })
         .collect();
-    Report::Route(Listed::<Coord>::new(&nodes))
+    Report::Route(Listed::<Node>::new(&nodes))
 }
 
 fn blocked(blocks: &BlockedWays) -> Report {
     let block = |way: &lager_topics::BlockedWay| {
         Some(Block {
-            edge: Edge {
-                node: Coord { x: way.x, y: way.y },
-                way: way.heading.get().map(direction)?,
-            },
+            way: Place::new(Node::new(way.x, way.y), way.heading.get()?),
             since_s: u32::try_from(way.since_ns / 1_000_000_000).unwrap_or(u32::MAX),
         })
     };
@@ -384,7 +362,7 @@ fn gone(queue: &OrderQueue) -> Report {
     Report::Gone(Listed::<ProductId>::new(&products))
 }
 
-/// What the line sensors read while they are calibrated, once all have been heard.
+/// What the line sensors read during a calibration, once all of them have been reported.
 fn sensors(health: &Health) -> Option<Report> {
     let is_running = health.calibration == Calibration::Running;
     let read = Some(health.calibrated).filter(|_| is_running)?;
@@ -410,25 +388,20 @@ fn latency(counted: &Durations) -> Report {
     }))
 }
 
-/// What stands on ways, whoever has put it there.
+/// The things that stand on ways.
 fn obstacles(truth: &Truth) -> Report {
     let stands = truth.obstacles().iter().filter_map(|stands| {
-        Some(Edge {
-            node: Coord {
-                x: stands.x,
-                y: stands.y,
-            },
-            way: stands.heading.get().map(direction)?,
-        })
+        let node = Node::new(stands.x, stands.y);
+        Some(Place::new(node, stands.heading.get()?))
     });
-    Report::Obstacles(Listed::<Edge>::new(&stands.collect::<Vec<_>>()))
+    Report::Obstacles(Listed::<Place>::new(&stands.collect::<Vec<_>>()))
 }
 
 fn truth(truth: &Truth) -> Report {
     Report::Truth(TruePose {
         x_mm: truth.x_mm.round() as i32,
         y_mm: truth.y_mm.round() as i32,
-        // The world counts counter-clockwise from the right.
+        // The world counts counter-clockwise, from the right.
         heading: Degrees::new(90 - truth.heading_rad.to_degrees().round() as i32),
         carrying: ProductId::new(truth.carrying),
     })

@@ -1,20 +1,23 @@
 //! The figures as Prometheus text, version 0.0.4.
 //!
-//! Every figure has its `HELP` and `TYPE`, whether its value is known yet or not; what is not known
-//! has no line. Units are base units and stand in the names. A moment is a Unix time, from which
-//! Prometheus makes an age (`time() - ...`) that also grows while the robot is silent.
+//! Every figure has its `HELP` and `TYPE`, even if its value is not known yet; an unknown value has
+//! no line. Units are base units and stand in the names. A moment is a Unix time. Prometheus makes
+//! an age of it (`time() - ...`) that also grows while the robot is silent.
 
 use std::fmt::{Display, Write};
 
-use lager_ports::{Clock, Stop};
-use lager_topics::{BoardHealth, Coded, Durations, Hold, Mode, Phase, StopCause};
+use lager_home::Clock;
+use lager_orders::Mode;
+use lager_sample::Coded;
+use lager_stop::Stop;
+use lager_topics::{BoardHealth, Durations, Hold, Phase, StopCause};
 
 use crate::figures::Figures;
 
 /// The media type of the text.
 pub(crate) const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-/// All figures. `stop` is what the stop word says, `None` if it cannot be read.
+/// All figures. `stop` comes from the stop word; `None` if it cannot be read.
 pub(crate) fn text(figures: &Figures, stop: Option<Option<Stop>>) -> String {
     let mut text = Text {
         out: String::with_capacity(32 << 10),
@@ -261,7 +264,7 @@ fn processes(text: &mut Text, figures: &Figures) {
     }
 }
 
-/// The text as far as it is written.
+/// The text so far.
 struct Text {
     out: String,
     robot: String,
@@ -307,8 +310,8 @@ impl Family<'_> {
         self.add(labels, format_args!("{seconds}.{ns:09}"));
     }
 
-    /// A line for each variant: 1 for the one that holds. Nothing is said of a state that is not
-    /// known, and a byte that means no variant is none of them.
+    /// A line for each variant: 1 for the present one. An unknown state has no lines, and neither
+    /// has a byte that means no variant.
     fn states<E: Coded>(&mut self, label: &str, state: Option<Option<E>>) {
         let Some(state) = state else {
             return;
@@ -318,7 +321,7 @@ impl Family<'_> {
         }
     }
 
-    /// Four buckets of the topic are one here: each doubling.
+    /// Four buckets of the topic are one bucket here, for each doubling.
     fn histogram(&mut self, stage: &str, durations: &Durations) {
         let mut count = 0;
         for (bucket, more) in durations.buckets.iter().enumerate() {
@@ -350,7 +353,7 @@ fn escaped(text: &str) -> String {
     text.replace('\n', "\\n")
 }
 
-/// `WaitingForMap` as `waiting_for_map`.
+/// Turns `WaitingForMap` into `waiting_for_map`.
 fn snake(name: &str) -> String {
     let mut snake = String::new();
     for letter in name.chars() {
@@ -364,7 +367,8 @@ fn snake(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use lager_topics::{NavigatorStatus, Role, Stamp, SteeringReport};
+    use lager_sample::Stamp;
+    use lager_topics::{NavigatorStatus, Role, SteeringReport};
     use serde_json::Value;
 
     use super::*;

@@ -1,14 +1,14 @@
-//! What is known of the robot: of each topic from the stamps, of everything else from what bridge,
-//! logic and the boards say of themselves.
+//! The robot's figures. Those of each topic come from the stamps. All others come from the states
+//! that bridge, logic and boards publish.
 
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use lager_ports::TopicInfo;
+use lager_sample::Stamp;
 use lager_topics::{
-    CommandLatency, DistanceFrame, Health, LineFrame, NavigatorStatus, PathLatency, Stamp,
-    SteeringReport,
+    CommandLatency, DistanceFrame, Health, LineFrame, NavigatorStatus, PathLatency, SteeringReport,
 };
 
 use crate::processes::{self, Process};
@@ -26,7 +26,7 @@ pub(crate) struct TopicFigures {
     pub(crate) readers: usize,
 }
 
-/// Everything the gateway tells.
+/// Everything that the gateway shows.
 #[derive(Clone, Debug)]
 pub(crate) struct Figures {
     pub(crate) robot: String,
@@ -34,9 +34,9 @@ pub(crate) struct Figures {
     pub(crate) health: Option<Health>,
     pub(crate) status: Option<NavigatorStatus>,
     pub(crate) report: Option<SteeringReport>,
-    /// When the sensor board was heard last, and the steering board, in ns of `CLOCK_MONOTONIC`.
+    /// When the sensor board and the steering board last spoke, in ns of `CLOCK_MONOTONIC`.
     pub(crate) heard_ns: [Option<u64>; 2],
-    /// The way of sensor frames to logic's decision, and of logic's orders to the wire.
+    /// The latencies from sensor frames to logic's decision, and from logic's orders to the wire.
     pub(crate) path: Option<Box<PathLatency>>,
     pub(crate) command: Option<Box<CommandLatency>>,
     pub(crate) processes: Vec<Process>,
@@ -71,8 +71,7 @@ impl Figures {
         }
     }
 
-    /// What a sample says, if anything of it is told. `real` says how long a span of robot time
-    /// lasts.
+    /// Takes the figures of a sample, if it has any. `real` converts a span of robot time.
     pub(crate) fn learn(
         &mut self,
         stamp: &Stamp,
@@ -99,7 +98,7 @@ impl Figures {
         }
     }
 
-    /// Who is at the ends of the topics.
+    /// The programs that write and read the topics.
     pub(crate) fn look_at_ends(&mut self, topics: &[TopicInfo]) {
         for topic in topics {
             let figures = self.topics.entry(topic.name.clone()).or_default();

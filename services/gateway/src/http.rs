@@ -1,8 +1,8 @@
 //! The server of the figures.
 //!
-//! It answers to a number and to `localhost`, and not to a name: a page of somebody else could
-//! point its own name to this machine, and read through its reader's browser what only this machine
-//! may.
+//! It answers when the browser asked for an address in digits or for `localhost`, and not for
+//! another name. The owner of another site could point the site's name to this machine. Then the
+//! browser of a person on this machine would read the figures for that site.
 
 use std::convert::Infallible;
 use std::io;
@@ -16,22 +16,22 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use lager_door::{Door, Limits, Visitor};
-use lager_ports::StopWord;
+use lager_stop::StopWord;
 use tokio::runtime::Runtime;
 
 use crate::Shared;
 use crate::exposition::{self, MEDIA_TYPE};
 
-/// Who may ask at a time: some servers, and people who look.
+/// How many may ask at a time: some servers, and people who look.
 const LIMITS: Limits = Limits {
     most: 32,
     whose: "the gateway",
 };
-/// How often the end is looked for.
+/// How often the server checks whether it must end.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Serves everybody until `over` is set: who asks for figures, if there is a `listener`, and
-/// whoever else is served in `runtime`.
+/// Serves everybody until `over` is set: requests for figures, if there is a `listener`, and
+/// everything else that runs in `runtime`.
 pub(crate) fn serve(
     runtime: &Runtime,
     listener: Option<TcpListener>,
@@ -78,7 +78,7 @@ async fn metrics(
         return (StatusCode::MISDIRECTED_REQUEST, why).into_response();
     }
     visitor.admit();
-    // Read now, as the bridge does before each packet: a stop is told at once, whoever is silent.
+    // Read the word now, as the bridge does before each packet, so that a stop is visible at once.
     let stop = StopWord::read(&shared.stop_word).ok();
     let stop = stop.map(|told| told.and_then(|told| told.stop()));
     let text = exposition::text(&shared.figures(), stop);

@@ -8,15 +8,15 @@
 //!
 //! - `listener`: polls every topic, also those that are opened later. It is an observer: nobody
 //!   wakes it, and it costs each writer one queue entry.
-//! - `figures`: what is known of the robot, from stamps and from what bridge and logic publish.
-//! - `exposition`: that as Prometheus text.
+//! - `figures`: the robot's figures, from stamps and from the states that bridge and logic publish.
+//! - `exposition`: the figures as Prometheus text.
 //! - `http`: the server, in a thread of its own.
-//! - `live`: every sample in JSON, and what people look at, for viewers; only with the feature
+//! - `live`: every sample as JSON, and pictures of the robot, for viewers; only with the feature
 //!   `foxglove`.
-//! - `processes`: what each process of the robot takes of the machine.
+//! - `processes`: processor time and memory of each process of the robot.
 //!
-//! It never writes to the bus, and nobody waits for it. Whoever asks gets what was known at the
-//! last poll; nothing is sampled away, and what the gateway itself has missed is a figure, too.
+//! It never writes to the bus, and nobody waits for it. A request gets the figures of the last
+//! poll. The listener reads every sample; if it has missed some, a figure says so.
 
 #![forbid(unsafe_code)]
 
@@ -33,31 +33,33 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use lager_ports::{Bus, IntrospectError, ReceiveError, Shutdown, StopPage, Watchdog};
+use lager_ports::{Bus, IntrospectError, ReceiveError};
+use lager_stop::StopPage;
+use lager_wake::{Shutdown, Watchdog};
 use tokio::runtime::Runtime;
 
 use figures::Figures;
 use listener::Viewer;
 
-/// Where Prometheus finds the figures unless somebody says otherwise.
+/// Where Prometheus finds the figures by default.
 pub const USUAL_METRICS: &str = "127.0.0.1:7430";
 
-/// Where Foxglove looks for a robot unless somebody says otherwise.
+/// Where Foxglove looks for a robot by default.
 pub const USUAL_FOXGLOVE: &str = "127.0.0.1:8765";
 
 /// Whether this program was built with the server for Foxglove.
 pub const HAS_FOXGLOVE: bool = cfg!(feature = "foxglove");
 
-/// The dashboard for Grafana, to be imported there: every query in it is of a figure that there is.
+/// The dashboard for Grafana, to import there. Every query in it uses figures that exist.
 pub const DASHBOARD: &str = include_str!("../grafana.json");
 
-/// The layout for Foxglove, to be imported there: every topic and field in it is one that there is.
+/// The layout for Foxglove, to import there. Every topic and field in it exists.
 pub const LAYOUT: &str = include_str!("../foxglove.json");
 
 /// Why there is no gateway.
 #[derive(Debug, thiserror::Error)]
 pub enum GatewayError {
-    /// An address cannot be had.
+    /// An address is not free.
     #[error("{address} cannot be had: {error}; choose another address with {flag}")]
     Listen {
         /// What chooses it.
@@ -76,14 +78,14 @@ pub enum GatewayError {
     /// The system does not let it run.
     #[error("the gateway cannot run: {0}")]
     Run(#[from] io::Error),
-    /// The bus could not be looked at.
+    /// The state of the bus could not be read.
     #[error(transparent)]
     Look(#[from] IntrospectError),
     /// A topic could not be read.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
-    /// Nothing will come any more.
-    #[error("the bus was damaged and has been cleared since the gateway joined it; start it again")]
+    /// The bus is another one now, so no sample will come any more.
+    #[error("the bus was damaged and replaced since the gateway joined it; start it again")]
     Cleared,
 }
 
@@ -97,8 +99,8 @@ impl GatewayError {
     }
 }
 
-/// Where programs outside find the robot. Everybody who reaches an address may look; nobody can do
-/// anything else there.
+/// Where programs outside find the robot. Everybody who can reach an address may look, and can do
+/// nothing else.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Addresses {
     /// The figures for Prometheus.
@@ -108,10 +110,10 @@ pub struct Addresses {
 }
 
 impl Addresses {
-    /// Refuses addresses that a gateway could not have at this moment.
+    /// Refuses addresses that a gateway could not use at this moment.
     ///
     /// # Errors
-    /// One is taken, or this program cannot speak to Foxglove.
+    /// An address is taken, or this program cannot speak to Foxglove.
     pub fn may_be_had(&self) -> Result<(), GatewayError> {
         if self.foxglove.is_some() && !HAS_FOXGLOVE {
             return Err(GatewayError::NoFoxglove);
@@ -144,7 +146,7 @@ impl Gateway {
     /// Listens at the addresses that are `wanted`, for whoever wants to look at `robot`.
     ///
     /// # Errors
-    /// An address cannot be had, or this program cannot speak to Foxglove.
+    /// An address is not free, or this program cannot speak to Foxglove.
     pub fn open(wanted: Addresses, robot: &str) -> Result<Self, GatewayError> {
         let mut runtime = tokio::runtime::Builder::new_current_thread();
         let runtime = runtime.enable_all().build()?;
@@ -186,8 +188,8 @@ impl Gateway {
         shutdown: &Shutdown,
     ) -> Result<(), GatewayError> {
         let shared = Shared {
-            figures: Arc::new(Mutex::new(Figures::new(bus.robot().as_str()))),
-            stop_word: bus.place().folder_of(bus.robot()).join(StopPage::FILE),
+            figures: Arc::new(Mutex::new(Figures::new(bus.unit().as_str()))),
+            stop_word: bus.home().folder_of(bus.unit()).join(StopPage::FILE),
         };
         let over = AtomicBool::new(false);
         std::thread::scope(|scope| {
@@ -245,7 +247,8 @@ impl Shared {
 #[cfg(test)]
 mod tests {
     use lager_journal::View;
-    use lager_topics::{Description, Topic, TopicVisitor, visit};
+    use lager_sample::{Description, Topic};
+    use lager_topics::{TopicVisitor, visit};
     use serde_json::Value;
 
     use super::LAYOUT;

@@ -4,25 +4,27 @@ use std::any::Any;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use lager_home::{BusWatch, Clock};
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    Bus, BusWatch, Clock, Found, IntrospectError, Layout, Look, Pace, PortError, ReceiveError,
-    Shutdown, Source, Subscriber, Watchdog,
+    Bus, Found, IntrospectError, Layout, Look, PortError, ReceiveError, Source, Subscriber,
 };
-use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
+use lager_sample::{Description, Stamp, Topic};
+use lager_topics::{TOPICS, TopicVisitor, visit};
+use lager_wake::{Pace, Shutdown, Watchdog};
 use serde::Serialize;
 
 use crate::figures::Figures;
 use crate::{GatewayError, Shared};
 
-/// How often it looks whether topics have come.
+/// How often it looks for new topics.
 const LOOK: Duration = Duration::from_secs(1);
-/// So many samples of one topic are taken before the next topic has its turn.
+/// How many samples of one topic it takes before the next topic has its turn.
 const TURN: u64 = 1_024;
 
-/// Whoever wants every sample as it comes, written as a recording has it.
+/// A part that gets every sample at once, in the form of a recording.
 pub(crate) trait Viewer {
-    /// A topic is listened to from now on; of a state the last sample lasts.
+    /// The listener reads a topic from now on. If it carries a state, its last sample stays true.
     fn open(&mut self, topic: &str, schema: &EnvelopeSchema, is_state: bool);
 
     /// Whether the next sample of a topic need be written at all.
@@ -32,7 +34,7 @@ pub(crate) trait Viewer {
     fn take(&mut self, topic: &str, stamp: &Stamp, message: &[u8]);
 }
 
-/// Reads every topic until the end is wished for, or `is_over`.
+/// Reads every topic until a request to end, or until `is_over`.
 pub(crate) fn listen(
     bus: &Bus,
     watchdog: &Watchdog,
@@ -92,7 +94,7 @@ struct Listener<'a> {
     viewer: Option<Box<dyn Viewer>>,
     feeds: Vec<Box<dyn Feed>>,
     opened: BTreeSet<String>,
-    /// Topics that could not be opened, which was said.
+    /// Topics that could not be opened and were reported.
     refused: BTreeSet<String>,
     services: BusWatch,
     ports: BusWatch,
@@ -103,11 +105,11 @@ trait Feed {
     /// How its messages are written, and whether it is a state.
     fn schema(&self) -> (EnvelopeSchema, bool);
 
-    /// Takes what has come, and tells how full the topic's queue was.
+    /// Takes the new samples. Returns how full the topic's queue was.
     fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError>;
 }
 
-/// Who is told of each sample.
+/// The receivers of each sample.
 struct Takers<'a> {
     figures: &'a mut Figures,
     real: &'a dyn Fn(Duration) -> Duration,
@@ -133,9 +135,8 @@ impl Takers<'_> {
 }
 
 impl Listener<'_> {
-    /// Opens topics that are not listened to yet, of the table and of other people's, and looks at
-    /// the ends of all, where services or ports have come or gone. A topic that cannot be opened is
-    /// tried again.
+    /// Opens new topics, of the table and of other programs, and updates the writers and readers of
+    /// all topics where ports have come or gone. Tries a topic again that could not be opened.
     fn look(&mut self, shared: &Shared) -> Result<(), GatewayError> {
         for entry in TOPICS {
             if !self.opened.contains(entry.name) {
@@ -145,13 +146,13 @@ impl Listener<'_> {
             }
         }
         // Both, so that each knows what is there now.
-        let place = self.bus.place();
+        let place = self.bus.home();
         if !(self.services.has_changed(place) | self.ports.has_changed(place)) {
             return Ok(());
         }
         let look = || self.bus.topics();
         let mut topics = self.watchdog.over("listing the topics", look)?;
-        topics.retain(|topic| topic.robot == *self.bus.robot());
+        topics.retain(|topic| topic.unit == *self.bus.unit());
         for topic in &topics {
             let is_new = topic.entry.is_none() && !self.opened.contains(&topic.name);
             if is_new && topic.layout == Layout::Described {

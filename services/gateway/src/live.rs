@@ -1,17 +1,16 @@
-//! Live views for Foxglove, by the server of its own crate: each topic is a channel, and beside
-//! them stand the views that a recording has, of the same definition ([`Scene`]).
+//! Live views for Foxglove, by the server of Foxglove's own crate. Each topic is a channel. Beside
+//! them are the same views as in a recording ([`Scene`]).
 //!
 //! ```text
 //!   listener ──JSON──> Live ──> channels ──queue──> client
-//!                       └─> Kept: the last message of what lasts ──> who subscribes later
+//!                       └─> LastMessages: the last message of what lasts ──> who subscribes later
 //! ```
 //!
-//! **Nobody is waited for.** Each client has a queue of its own. What finds it full pushes the
-//! oldest message out, so a client that is slow or reads nothing loses messages and holds nobody
-//! up.
+//! **The gateway waits for no client.** Each client has a queue of its own. When it is full, a new
+//! message pushes the oldest one out. So a client that is slow or reads nothing loses messages and
+//! holds nobody up.
 //!
-//! **A client can only look.** The server offers nothing that a client could write, ask for or
-//! call.
+//! **A client can only look.** It can write nothing and call nothing on this server.
 
 use std::collections::{BTreeMap, HashMap};
 use std::net::SocketAddr;
@@ -19,9 +18,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use foxglove::websocket::{ChannelView, Client, ServerListener};
 use foxglove::{ChannelId, Context, FoxgloveError, PartialMetadata, RawChannel, Schema};
+use lager_home::Clock;
 use lager_journal::{EnvelopeSchema, Scene, View};
-use lager_ports::Clock;
-use lager_topics::Stamp;
+use lager_sample::Stamp;
 use tokio::runtime::Runtime;
 
 use crate::GatewayError;
@@ -32,29 +31,29 @@ pub(crate) struct Live {
     /// The server knows it only weakly.
     context: Arc<Context>,
     address: SocketAddr,
-    /// What is added to a stamp's time to get ns since 1970.
+    /// The difference between ns since 1970 and a stamp's time.
     unix_offset_ns: i64,
     scene: Scene,
     topics: BTreeMap<String, Outlet>,
     views: BTreeMap<View, Outlet>,
-    kept: Arc<Kept>,
+    kept: Arc<LastMessages>,
 }
 
 /// A channel.
 struct Outlet {
     channel: Arc<RawChannel>,
-    /// Whether who subscribes later gets the last message.
+    /// Whether a later subscriber gets the last message.
     lasts: bool,
 }
 
 impl Live {
-    /// Listens at `address`, with connections served whenever `runtime` runs.
+    /// Listens at `address`. Connections are served while `runtime` runs.
     pub(crate) fn open(
         address: SocketAddr,
         robot: &str,
         runtime: &Runtime,
     ) -> Result<Self, GatewayError> {
-        let (context, kept) = (Context::new(), Arc::new(Kept::default()));
+        let (context, kept) = (Context::new(), Arc::new(LastMessages::default()));
         let host = match address {
             SocketAddr::V4(address) => address.ip().to_string(),
             SocketAddr::V6(address) => format!("[{}]", address.ip()),
@@ -125,9 +124,9 @@ impl Viewer for Live {
     }
 }
 
-/// The last message of each channel whose messages last.
+/// The last message of each channel that carries a state.
 #[derive(Default)]
-struct Kept(Mutex<HashMap<ChannelId, Last>>);
+struct LastMessages(Mutex<HashMap<ChannelId, Last>>);
 
 struct Last {
     channel: Arc<RawChannel>,
@@ -135,7 +134,7 @@ struct Last {
     message: Vec<u8>,
 }
 
-impl Kept {
+impl LastMessages {
     fn lock(&self) -> MutexGuard<'_, HashMap<ChannelId, Last>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -161,7 +160,7 @@ impl Kept {
     }
 }
 
-impl ServerListener for Kept {
+impl ServerListener for LastMessages {
     fn on_subscribe(&self, client: Client, channel: ChannelView<'_>) {
         let kept = self.lock();
         if let Some(last) = kept.get(&channel.id()) {

@@ -1,14 +1,13 @@
-//! What the robot's processes take of the machine, as the kernel counts it.
+//! Processor time and memory of the robot's processes, as the kernel counts them.
 
 use std::fs;
 
 use lager_ports::{Peer, TopicInfo};
-use lager_topics::Role;
 
 /// One process of the robot.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Process {
-    pub(crate) role: Role,
+    pub(crate) role: String,
     pub(crate) pid: u32,
     /// Time of a core that it has taken, in user mode and in the kernel.
     pub(crate) cpu_seconds: f64,
@@ -20,8 +19,8 @@ pub(crate) struct Process {
 pub(crate) fn at(topics: &[TopicInfo]) -> Vec<Process> {
     let peers = topics.iter();
     let peers = peers.flat_map(|topic| topic.writers.iter().chain(&topic.readers));
-    let mut found: Vec<(u32, Role)> = peers
-        .filter_map(|Peer { role, pid }| Some((*pid, (*role)?)))
+    let mut found: Vec<(u32, String)> = peers
+        .filter_map(|Peer { part, pid, .. }| Some((*pid, part.clone()?)))
         .collect();
     found.sort_by_key(|(pid, _)| *pid);
     found.dedup_by_key(|(pid, _)| *pid);
@@ -70,12 +69,17 @@ mod tests {
     fn this_process_is_found_once_whatever_it_reads() {
         let pid = std::process::id();
         let here = Peer {
-            role: Some(Role::Logic),
+            part: Some("logic".to_owned()),
             pid,
+            observes: false,
         };
-        let stranger = Peer { role: None, pid: 0 };
+        let stranger = Peer {
+            part: None,
+            pid: 0,
+            observes: false,
+        };
         let topic = TopicInfo {
-            robot: "r1".parse().expect("a name"),
+            unit: "r1".parse().expect("a name"),
             name: "sensor/line".into(),
             entry: None,
             layout: lager_ports::Layout::Ours,
@@ -84,13 +88,13 @@ mod tests {
             subscribers: 2,
             observers: 0,
             places: None,
-            writers: vec![here],
-            readers: vec![here, stranger],
+            writers: vec![here.clone()],
+            readers: vec![here.clone(), stranger],
             woken: Vec::new(),
         };
         let found = at(&[topic.clone(), topic]);
         assert_eq!(found.len(), 1);
-        assert_eq!((found[0].role, found[0].pid), (Role::Logic, pid));
+        assert_eq!((found[0].role.as_str(), found[0].pid), ("logic", pid));
         assert!(found[0].resident_bytes > 0);
     }
 }

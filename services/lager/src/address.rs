@@ -8,25 +8,25 @@ use serde::de::{Deserializer, Error, Visitor};
 /// The address at which only this machine reaches itself.
 const THIS_MACHINE: &str = "127.0.0.1";
 
-/// The address of a computer that is called: a host and a port, or a port of this machine.
+/// The address of another computer: a host and a port, or a port of this machine.
 ///
 /// # Errors
-/// It is none: the sentence says how one is written.
+/// The text is not an address. The sentence says how to write one.
 pub fn calls(text: &str) -> Result<String, String> {
     let (host, port) = text.rsplit_once(':').unwrap_or((THIS_MACHINE, text));
     match !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0) {
         true => Ok(format!("{host}:{port}")),
         false => Err(format!(
-            "`{text}` is no address; write a host and a port, as in 192.168.1.5:7420, or only a port of this machine, as in 7420"
+            "`{text}` is not an address; write a host and a port, as in 192.168.1.5:7420, or only a port of this machine, as in 7420"
         )),
     }
 }
 
-/// Where this machine listens: an address of its own and a port, or a port that only this machine
-/// reaches.
+/// An address at which this machine listens: one of its own and a port, or only a port, which only
+/// this machine can reach.
 ///
 /// # Errors
-/// It is none: the sentence says how one is written.
+/// The text is not an address. The sentence says how to write one.
 pub fn listens(text: &str) -> Result<SocketAddr, String> {
     let (host, port) = text.rsplit_once(':').unwrap_or((THIS_MACHINE, text));
     let host = match host {
@@ -35,12 +35,12 @@ pub fn listens(text: &str) -> Result<SocketAddr, String> {
     };
     format!("{host}:{port}").parse().map_err(|_| {
         format!(
-            "`{text}` is no address to listen at; write an address of this machine and a port, as in 192.168.1.5:7410 (0.0.0.0 for all of them), or only a port, as in 7410, for this machine alone"
+            "`{text}` is not an address to listen at; write an address of this machine and a port, as in 192.168.1.5:7410 (0.0.0.0 for all of them), or only a port, as in 7410, for this machine alone"
         )
     })
 }
 
-/// The same in the configuration, where a port may be a number.
+/// The same in the configuration. A port may be a number there.
 pub fn in_config<'de, D: Deserializer<'de>>(value: D) -> Result<Option<SocketAddr>, D::Error> {
     struct Listens;
 

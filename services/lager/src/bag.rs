@@ -1,4 +1,4 @@
-//! `lager bag`: recordings of the bus, as the command line asks for them.
+//! `lager bag`: runs the recorder's tools as the command line says.
 
 mod verify;
 
@@ -8,24 +8,27 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::Result;
-use lager_ports::{Bus, Clock, Shutdown};
+use lager_home::Clock;
+use lager_ports::Bus;
 use lager_recorder::{
     BagError, PlayConfig, PlayError, Progress, RecordConfig, Recorded, Split, Stamps,
 };
+use lager_supervisor::console;
 use lager_topics::{Role, TOPICS};
+use lager_wake::Shutdown;
 use serde_json::json;
 
 use crate::cli::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 use crate::config::Config;
-use crate::patience::Patience;
-use crate::voice::{self, Speaker};
+use crate::time_limit::TimeLimit;
+use crate::traces::Speaker;
 use crate::{diagnose, exit};
 
-/// How often what has come is put on the disk. A kill takes what came since, and while the last of
-/// it was written: on a busy machine less than 300 ms.
+/// How often the recorder writes the samples to the disk. A kill loses the samples since the last
+/// finished write: on a busy machine less than 300 ms.
 const FLUSH: Duration = Duration::from_millis(150);
 
-/// Does what was asked for.
+/// Runs the chosen tool.
 pub fn run(config: &Config, args: BagArgs, shutdown: &Shutdown) -> Result<ExitCode> {
     let out = &mut BufWriter::new(std::io::stdout().lock());
     let done = match args.command {
@@ -64,7 +67,7 @@ fn record(
     shutdown: &Shutdown,
 ) -> Result<ExitCode> {
     let in_table = |name: &String| TOPICS.iter().any(|entry| entry.name == name);
-    // Other people's topics need no robot.
+    // Topics of other programs need no robot.
     if !args.wait && (args.topic.is_empty() || args.topic.iter().any(in_table)) {
         diagnose::must_be_up(config)?;
     }
@@ -79,7 +82,7 @@ fn record(
         queue: args.queue,
         flush: FLUSH,
     };
-    let patience = Patience::in_order(config, shutdown)?;
+    let patience = TimeLimit::in_order(config, shutdown)?;
     let join = || Bus::open(&config.bus()?, Role::Recorder).map_err(anyhow::Error::from);
     let bus = patience.watchdog.over("joining the bus", join)?;
     let mut live = Live::new(as_json);
@@ -102,8 +105,8 @@ fn named_after(robot: &str) -> PathBuf {
     PathBuf::from(format!("{robot}-{}-{}.mcap", &digits[..8], &digits[8..14]))
 }
 
-/// What is shown while it records: a line that changes on a terminal, JSON lines for programs, and
-/// for both what goes wrong.
+/// What people and programs see while it records: on a terminal a line that changes, for programs
+/// JSON lines; and for both the warnings.
 struct Live {
     as_json: bool,
     has_line: bool,
@@ -132,7 +135,7 @@ impl Live {
         }
         self.missing = (total.lost, total.dropped);
         if self.as_json {
-            // A reader that has gone ends nothing: the file is what counts.
+            // Go on even if the output's reader has gone: the file matters.
             let _ = writeln!(std::io::stdout(), "{}", as_json(progress));
         } else if self.has_line {
             eprint!(
@@ -148,10 +151,10 @@ impl Live {
 
     fn say(&mut self, what: &str) {
         self.end();
-        voice::say(&Speaker::Tool.line(what));
+        console::complain(&Speaker::Tool.line(what));
     }
 
-    /// Leaves the line that changes.
+    /// Ends the line that changes.
     fn end(&self) {
         if self.has_line {
             eprintln!();
@@ -179,11 +182,11 @@ fn mib(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
-/// The last lines: the files, and for each topic what became of its samples.
+/// The last lines: the files, and for each topic how many samples were recorded and lost.
 fn sum_up(recorded: &Recorded, as_json_line: bool) -> Result<()> {
     for absent in &recorded.absent {
         let line = format!("{absent} was never there, so nothing of it is recorded");
-        voice::say(&Speaker::Tool.line(&line));
+        console::complain(&Speaker::Tool.line(&line));
     }
     let progress = &recorded.progress;
     let files: Vec<_> = recorded
@@ -194,10 +197,10 @@ fn sum_up(recorded: &Recorded, as_json_line: bool) -> Result<()> {
     if as_json_line {
         let mut value = as_json(progress);
         value["files"] = json!(files);
-        return crate::say(&value.to_string());
+        return console::print(&value.to_string());
     }
     let total = progress.total();
-    crate::say(&format!(
+    console::print(&format!(
         "{}: {} samples in {:.1} s, {:.2} MiB; {} lost before the recorder, {} dropped by it",
         files.join(" "),
         total.received - total.dropped,
@@ -209,7 +212,7 @@ fn sum_up(recorded: &Recorded, as_json_line: bool) -> Result<()> {
     for topic in &progress.topics {
         let count = topic.count;
         if count.missing() > 0 {
-            crate::say(&format!(
+            console::print(&format!(
                 "  {}: {} received, {} lost, {} dropped",
                 topic.name, count.received, count.lost, count.dropped
             ))?;
@@ -221,7 +224,7 @@ fn sum_up(recorded: &Recorded, as_json_line: bool) -> Result<()> {
 fn play(config: &Config, args: PlayArgs, as_json: bool, shutdown: &Shutdown) -> Result<ExitCode> {
     if args.verify {
         // It needs no bus, and ends at the first Ctrl-C.
-        let _patience = Patience::new(config, shutdown)?;
+        let _patience = TimeLimit::new(config, shutdown)?;
         return verify::verify(&args.file, args.with, as_json);
     }
     if args.to.is_some_and(|to| to <= args.from) {
@@ -240,7 +243,7 @@ fn play(config: &Config, args: PlayArgs, as_json: bool, shutdown: &Shutdown) -> 
             StampsArg::Recorded => Stamps::Recorded,
         },
     };
-    let patience = Patience::in_order(config, shutdown)?;
+    let patience = TimeLimit::in_order(config, shutdown)?;
     let join = || Bus::open(&config.bus()?, Role::Recorder).map_err(anyhow::Error::from);
     let bus = patience.watchdog.over("joining the bus", join)?;
     let mut begun = |left_out: &[String]| {
@@ -248,7 +251,7 @@ fn play(config: &Config, args: PlayArgs, as_json: bool, shutdown: &Shutdown) -> 
             let line = format!(
                 "{topic} is not played: this build does not know it and nobody has it open"
             );
-            voice::say(&Speaker::Tool.line(&line));
+            console::complain(&Speaker::Tool.line(&line));
         }
     };
     let played = lager_recorder::play(&bus, &patience.watchdog, shutdown, &wanted, &mut begun);
@@ -258,8 +261,8 @@ fn play(config: &Config, args: PlayArgs, as_json: bool, shutdown: &Shutdown) -> 
         PlayError::Lock(error) => error.into(),
         other => other.into(),
     })?;
-    let robot = bus.robot();
-    crate::say(&match as_json {
+    let robot = bus.unit();
+    console::print(&match as_json {
         true => json!({"robot": robot.as_str(), "samples": played.samples}).to_string(),
         false => format!("{} samples played onto robot `{robot}`", played.samples),
     })?;

@@ -1,28 +1,27 @@
-//! `lager comm`: what the communication unit is told when it starts, and the watch over it.
+//! `lager comm`: starts the communication unit, and guards its calls into the bus.
 
 use std::time::Duration;
 
 use anyhow::{Context, Result};
 use lager_comm::CommConfig;
 use lager_lines::Name;
-use lager_ports::{GivenUp, Shutdown, Watchdog};
+use lager_supervisor::signals;
+use lager_wake::{GivenUp, Shutdown, Watchdog};
 
 use crate::cli::CommArgs;
 use crate::config::{Config, StationSection};
-use crate::exit;
-use crate::runtime::RuntimeFolder;
 
 /// How long one call into the bus may take, in real time.
 const CALL: Duration = Duration::from_secs(3);
 
-/// The configuration it runs with, and what it does. Started beside a robot that is up it takes
-/// over that robot's clock, in which leases count.
+/// The configuration that it runs with, and what it does. If it starts beside a robot that is up,
+/// it takes over that robot's clock, because leases count in that time.
 ///
 /// # Errors
-/// The robot's name is none that the external computer could call it by.
+/// A station cannot use the robot's name.
 pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)> {
     let mut joined = config.clone();
-    if let Some(running) = RuntimeFolder::running(config)? {
+    if let Some(running) = config.of_running_robot()? {
         joined.speed = running.speed;
         joined.chip.clock = running.chip.clock;
         joined.comm.secret = joined.comm.secret.or(running.comm.secret);
@@ -35,20 +34,20 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
             .unwrap_or_else(|| StationSection::USUAL.to_owned()),
         name,
         secret: args.secret.clone().or_else(|| joined.comm.secret.clone()),
-        link_lost: joined.comm.link_lost.into(),
+        link_lost: joined.comm.link_lost,
         resume: args.service.resume,
     };
     Ok((joined, wanted))
 }
 
-/// Ends this process when a call into the bus hangs, with a sentence that says which. `up` starts
-/// another one.
+/// Ends this process when a call into the bus hangs, with a sentence that names the call. `up`
+/// starts another one.
 ///
 /// # Errors
-/// The system has no thread for it.
+/// The system gives no thread for it.
 pub fn watch(shutdown: &Shutdown) -> Result<Watchdog> {
     let end = |why| match why {
-        GivenUp::Interrupted => std::process::exit(exit::INTERRUPTED),
+        GivenUp::Interrupted => std::process::exit(signals::INTERRUPTED),
         GivenUp::Hung { what } => {
             tracing::error!("{what} has taken {} s; it hangs", CALL.as_secs());
             std::process::exit(1);

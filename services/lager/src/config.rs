@@ -1,8 +1,8 @@
 //! The configuration: one TOML file, every key with a default, command-line flags on top.
 //!
-//! It is apart from the command line because the services read it too. The supervisor gives every
-//! child process the effective configuration on its standard input, so a flag reaches all of them
-//! or none. An unknown key is an error, never ignored.
+//! It stands apart from the command line because the services read it too. The supervisor gives
+//! every child process the effective configuration on its standard input, so a flag reaches all of
+//! them or none. An unknown key is an error.
 
 mod bus;
 mod buttons;
@@ -12,6 +12,7 @@ mod gateway;
 mod invalid;
 mod logic;
 mod realtime;
+mod section;
 mod station;
 
 use std::io::Read as _;
@@ -20,71 +21,72 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
+use lager_home::UnitName;
 use lager_lines::check_names;
+use lager_orders::Pick;
 use lager_plant::{MOST_OBSTACLES, Warehouse};
-use lager_ports::{BusConfig, RobotName};
+use lager_ports::BusConfig;
 use lager_station::files;
+use lager_supervisor::Service;
+use lager_supervisor::runtime_folder::RuntimeFolder;
+use lager_supervisor::state_folder;
+use lager_topics::LAGER;
 use lager_wire::ArmProfile;
 use serde::{Deserialize, Serialize};
 
 pub use bus::{BusSection, Waiting};
 pub use buttons::ButtonsSection;
 pub use chip::ChipSection;
+pub use documented::flag;
 pub use gateway::GatewaySection;
-pub use logic::{LogicSection, PickBy};
+pub use logic::LogicSection;
 pub use realtime::RealtimeSection;
-pub use station::{CommSection, StationSection, WithoutLink};
+pub use station::{CommSection, StationSection};
+
+use section::section;
 
 use crate::meant::meant;
 use crate::realtime::HIGHEST_PRIORITY;
-use crate::services::Service;
 
-/// The rates that boards are built for, in baud: that of today and the original's UBRR 103.
+/// The baud rates of the boards: today's, and the original's (UBRR 103).
 pub const BAUD_RATES: [u32; 2] = [500_000, 9_600];
 
-/// How many times as fast as real time a robot's clock may run.
+/// The allowed speeds of a robot's clock; 1 is real time.
 pub const SPEEDS: RangeInclusive<f64> = 0.01..=20.0;
 
-/// Everything a process of the robot needs to know at start.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Config {
-    /// The robot's name: the middle part of every topic's name.
-    pub name: String,
-    /// How many times as fast as real time the robot's clock runs; real boards need 1, and
-    /// emulated ones run as fast as the machine can if that is less.
-    pub speed: f64,
-    /// What the services drive.
-    pub body: Body,
-    /// A built-in warehouse (`small`, `curved`, `large`) or the path of a warehouse file.
-    pub warehouse: String,
-    /// Where it keeps what outlives it; unset, as `state.rs` has it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub state: Option<PathBuf>,
-    /// Where the traces go.
-    pub log: LogSection,
-    /// Where the bus lives.
-    pub bus: BusSection,
-    /// What the services on the path from sensor to steering want of the machine.
-    pub realtime: RealtimeSection,
-    /// The two serial ports.
-    pub serial: SerialSection,
-    /// What the arm may do, as the steering board is told.
-    pub arm: ArmProfile,
-    /// What logic knows of the robot's measures.
-    pub logic: LogicSection,
-    /// The simulated robot and the emulated boards' world.
-    pub simulator: SimulatorSection,
-    /// The emulated boards.
-    pub chip: ChipSection,
-    /// The external computer.
-    pub station: StationSection,
-    /// How the robot talks to it.
-    pub comm: CommSection,
-    /// The robot's own buttons.
-    pub buttons: ButtonsSection,
-    /// What programs outside are shown.
-    pub gateway: GatewaySection,
+section! {
+    ""
+    /// Everything a process of the robot needs to know at start.
+    pub struct Config {
+        /// The robot's name: the middle part of every topic's name.
+        pub name: String = "r1".into(),
+        /// The speed of the robot's clock; 1 is real time. Real boards need 1. Emulated boards run
+        /// slower if the machine cannot keep up.
+        pub speed: f64 = 1.0,
+        /// What the services drive: "sim", the simulated robot, "chip", the boards' real images in an
+        /// emulator, or "serial", the boards at [serial].
+        pub body: Body = Body::Sim,
+        /// A built-in warehouse (small, curved, large) or the path of a warehouse file.
+        pub warehouse: String = "small".into(),
+        /// The folder that keeps what outlives `lager up`: changes that the panel made to a
+        /// built-in warehouse (changes to a file are saved in the file), the orders that wait, and
+        /// which goods a real robot has not found in their place. Unset, .state in the folder of
+        /// the bus if one is named, else $STATE_DIRECTORY, else $XDG_STATE_HOME/lager, else
+        /// ~/.local/state/lager.
+        pub state: Option<PathBuf> = None,
+        pub log: LogSection = LogSection::default(),
+        pub bus: BusSection = BusSection::default(),
+        pub realtime: RealtimeSection = RealtimeSection::default(),
+        pub serial: SerialSection = SerialSection::default(),
+        pub arm: ArmProfile = ArmProfile::default(),
+        pub logic: LogicSection = LogicSection::default(),
+        pub simulator: SimulatorSection = SimulatorSection::default(),
+        pub chip: ChipSection = ChipSection::default(),
+        pub station: StationSection = StationSection::default(),
+        pub comm: CommSection = CommSection::default(),
+        pub buttons: ButtonsSection = ButtonsSection::default(),
+        pub gateway: GatewaySection = GatewaySection::default(),
+    }
 }
 
 /// What stands at the other end of the two UARTs.
@@ -110,92 +112,52 @@ impl Body {
     }
 }
 
-/// `[log]`: what happened, for whoever debugs.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LogSection {
-    /// The file that traces are appended to, instead of none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub file: Option<PathBuf>,
-    /// One JSON value a line instead of text for people.
-    pub json: bool,
-}
-
-/// `[serial]`: the cables to the boards.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SerialSection {
-    /// Port of the sensor board. Given the wrong way round the robot works all the same: the
-    /// boards tell who they are.
-    pub sensor: PathBuf,
-    /// Port of the steering board.
-    pub steering: PathBuf,
-    /// Baud rate of both: 500000, or 9600 for boards built with the original's UBRR 103.
-    pub baud: u32,
-    /// Whether the sensor board sends the raw reading of all eleven sensors as well.
-    pub raw_line: bool,
-    /// Whether an original steering board is driven, whose commands have no age limit.
-    pub original_boards: bool,
-}
-
-/// `[simulator]`: the simulated robot and the emulated boards' world.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SimulatorSection {
-    /// Seed of all noise: the same seed is the same robot.
-    pub seed: u64,
-    /// So many things come and go on the ways, at random.
-    pub obstacles: u32,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            name: "r1".into(),
-            speed: 1.0,
-            body: Body::Sim,
-            warehouse: "small".into(),
-            state: None,
-            log: LogSection::default(),
-            bus: BusSection::default(),
-            realtime: RealtimeSection::default(),
-            serial: SerialSection::default(),
-            arm: ArmProfile::default(),
-            logic: LogicSection::default(),
-            simulator: SimulatorSection::default(),
-            chip: ChipSection::default(),
-            station: StationSection::default(),
-            comm: CommSection::default(),
-            buttons: ButtonsSection::default(),
-            gateway: GatewaySection::default(),
-        }
+section! {
+    "log"
+    /// Traces for debugging.
+    pub struct LogSection {
+        /// File to which all processes of the robot append their traces: those that RUST_LOG
+        /// selects, or "info". Unset, they trace only what RUST_LOG selects, on standard error.
+        pub file: Option<PathBuf> = None,
+        /// Traces as JSON for programs, one value a line: into that file, or on standard error.
+        pub json: bool = false,
     }
 }
 
-impl Default for SerialSection {
-    fn default() -> Self {
-        Self {
-            sensor: "/dev/lager-sensor".into(),
-            steering: "/dev/lager-steering".into(),
-            baud: 500_000,
-            raw_line: false,
-            original_boards: false,
-        }
+section! {
+    "serial"
+    /// The cables to the boards.
+    pub struct SerialSection {
+        /// The ports of the boards; it does not matter which board is at which port.
+        pub sensor: PathBuf = "/dev/lager-sensor".into(),
+        pub steering: PathBuf = "/dev/lager-steering".into(),
+        /// Baud rate of both: 500000, or 9600 for boards of the original build.
+        pub baud: u32 = BAUD_RATES[0],
+        /// Whether the sensor board also sends the raw reading of all eleven sensors.
+        pub raw_line: bool = false,
+        /// Whether to drive an original steering board. Its commands have no age limit. Boards of
+        /// this project stop the wheels within 200 ms whatever dies; an original board goes on with
+        /// its last command until the bridge, or its power switch, makes it stand. If false, the
+        /// bridge only makes such a board stand.
+        pub original_boards: bool = false,
     }
 }
 
-impl Default for SimulatorSection {
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            obstacles: 0,
-        }
+section! {
+    "simulator"
+    /// The simulated robot and the emulated boards' world.
+    pub struct SimulatorSection {
+        /// Seed of all noise: the same seed gives the same robot.
+        pub seed: u64 = 1,
+        /// How many things come and go on the ways of the simulated floor, at random: 0 to 64. They
+        /// need squares of 50 cm or more.
+        pub obstacles: u32 = 0,
     }
 }
 
 impl Config {
-    /// Reads `path`, where `-` is standard input, or `lager.toml` in the current folder where there
-    /// is one, or the defaults.
+    /// Reads `path`, where `-` is standard input. Without a path it reads `lager.toml` in the
+    /// current folder, or takes the defaults if there is none.
     pub fn load(path: Option<&Path>) -> Result<Self> {
         let path = match path {
             Some(path) => path,
@@ -221,9 +183,9 @@ impl Config {
         })
     }
 
-    /// Refuses values no process could work with, each with a sentence.
+    /// Refuses values that no process could work with. Each error is a sentence.
     pub fn validate(&self) -> Result<()> {
-        self.name.parse::<RobotName>()?;
+        self.name.parse::<UnitName>()?;
         if !SPEEDS.contains(&self.speed) {
             bail!(
                 "speed is {}; it must be from {} to {} (`lager simulate` runs faster)",
@@ -264,18 +226,31 @@ impl Config {
         Ok(())
     }
 
-    /// The bus this configuration names.
+    /// The configuration with which the running robot of this name was started; `None` if no such
+    /// robot runs on this bus.
+    pub fn of_running_robot(&self) -> Result<Option<Self>> {
+        let file = RuntimeFolder::running(&self.bus()?)?;
+        file.map(|file| Self::load(Some(&file))).transpose()
+    }
+
+    /// The folder of everything that outlives a robot and a station.
+    pub fn state_root(&self) -> Result<PathBuf> {
+        state_folder::root(self.state.as_deref(), self.bus.folder.as_deref())
+    }
+
+    /// The bus that this configuration names.
     pub fn bus(&self) -> Result<BusConfig> {
         Ok(BusConfig {
-            robot: self.name.parse()?,
+            application: &LAGER,
+            unit: self.name.parse()?,
             speed: self.speed,
             clock: self.chip.clock.clone(),
             folder: self.bus.folder.clone(),
         })
     }
 
-    /// The warehouse, built in or from its file, checked. It has room for the things that are to
-    /// come and go there, if any are.
+    /// The warehouse, built in or from its file, checked. Also checks that it has room for the
+    /// things that come and go there.
     pub fn warehouse(&self) -> Result<Warehouse> {
         let warehouse = warehouse(&self.warehouse)?;
         if self.body != Body::Serial && self.simulator.obstacles > 0 {
@@ -286,15 +261,15 @@ impl Config {
         Ok(warehouse)
     }
 
-    /// Who picks the goods up: as told, or else as it is usual with the body.
-    pub fn pick(&self) -> PickBy {
+    /// Who picks the goods up: from the configuration, or by the kind of body.
+    pub fn pick(&self) -> Pick {
         self.logic.pick.unwrap_or(match self.body {
-            Body::Serial => PickBy::Manual,
-            Body::Sim | Body::Chip => PickBy::Auto,
+            Body::Serial => Pick::Manual,
+            Body::Sim | Body::Chip => Pick::Auto,
         })
     }
 
-    /// What the navigator is told.
+    /// The navigator's part of the configuration.
     pub fn navigator(&self) -> lager_logic::LogicConfig {
         lager_logic::LogicConfig {
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
@@ -307,7 +282,7 @@ impl Config {
             try_again: Duration::from_secs(self.logic.try_again_s.into()),
             reach_shoulder: self.logic.reach_shoulder,
             reach_elbow: self.logic.reach_elbow,
-            pick: self.pick().into(),
+            pick: self.pick(),
             arm: self.arm,
             waiting: self.bus.policy(),
             ..lager_logic::LogicConfig::default()
@@ -340,7 +315,7 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
 
 #[cfg(test)]
 mod tests {
-    use lager_ports::Policy;
+    use lager_wake::Policy;
 
     use super::*;
 
@@ -445,14 +420,14 @@ mod tests {
     #[test]
     fn who_picks_is_as_told_and_else_as_usual_with_the_body() {
         for (text, pick) in [
-            ("", PickBy::Auto),
-            ("body = \"chip\"", PickBy::Auto),
-            ("body = \"serial\"", PickBy::Manual),
-            ("[logic]\npick = \"manual\"", PickBy::Manual),
-            ("body = \"serial\"\n[logic]\npick = \"auto\"", PickBy::Auto),
+            ("", Pick::Auto),
+            ("body = \"chip\"", Pick::Auto),
+            ("body = \"serial\"", Pick::Manual),
+            ("[logic]\npick = \"manual\"", Pick::Manual),
+            ("body = \"serial\"\n[logic]\npick = \"auto\"", Pick::Auto),
         ] {
             let config: Config = toml::from_str(text).expect("valid TOML");
-            assert_eq!(config.navigator().pick, pick.into(), "{text}");
+            assert_eq!(config.navigator().pick, pick, "{text}");
         }
     }
 

@@ -1,26 +1,27 @@
-//! Why a robot does not answer, as far as that can be found out without its bus.
+//! Finds out why a robot does not answer, without using its bus.
 //!
-//! An error of the bus says what failed. This file is asked after such an error, and before a tool
-//! waits for a robot that is not there.
+//! An error of the bus says only what failed. The program calls this after such an error, and
+//! before a tool waits for a robot that is not up.
 
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use lager_ports::{Holder, Shortage, called};
+use lager_home::{Holder, Shortage};
+use lager_topics::{LAGER, called};
 
 use crate::config::Config;
 
 /// Refuses to wait for a robot that is not up.
 pub fn must_be_up(config: &Config) -> Result<()> {
     let bus = config.bus()?;
-    let place = bus.place()?;
+    let place = bus.home()?;
     let up = place.up();
-    if up.contains_key(&bus.robot) {
+    if up.contains_key(&bus.unit) {
         return Ok(());
     }
     let others: Vec<&str> = up.keys().map(|robot| robot.as_str()).collect();
     let others = match others.as_slice() {
-        [] => match lager_ports::other_places().first() {
+        [] => match lager_home::other_homes(LAGER.family).first() {
             Some(other) => other.to_string(),
             None => "no other robot is up either".to_owned(),
         },
@@ -28,7 +29,7 @@ pub fn must_be_up(config: &Config) -> Result<()> {
     };
     bail!(
         "no robot `{}` is up on the bus in {}; `lager up` starts one; {others}",
-        bus.robot,
+        bus.unit,
         place.folder().display()
     );
 }
@@ -47,7 +48,7 @@ fn damage(mut segments: Vec<PathBuf>) -> Option<String> {
     ))
 }
 
-/// What keeps the robot from answering, a sentence for each cause that is found.
+/// What keeps the robot from answering: a sentence for each cause that it finds.
 pub fn causes(config: &Config) -> Vec<String> {
     let mut causes = Vec::new();
     if let Some(shortage) = Shortage::now() {
@@ -56,17 +57,17 @@ pub fn causes(config: &Config) -> Vec<String> {
     let Ok(bus) = config.bus() else {
         return causes;
     };
-    let Ok(place) = bus.place() else {
-        // That error already names folder and cause.
+    let Ok(place) = bus.home() else {
+        // That error already names the folder and the cause.
         return causes;
     };
-    causes.extend(damage(lager_ports::damaged(&bus).unwrap_or_default()));
-    let holders = place.up().remove(&bus.robot).unwrap_or_default();
+    causes.extend(damage(lager_home::damaged(&place)));
+    let holders = place.up().remove(&bus.unit).unwrap_or_default();
     for Holder { what, pid, .. } in holders.iter().filter(|holder| holder.frozen) {
         causes.push(format!(
             "the {} of the robot `{}` (process {pid}) is frozen; `kill -CONT {pid}` lets it go on",
             called(what),
-            bus.robot
+            bus.unit
         ));
     }
     causes

@@ -1,8 +1,7 @@
-//! `lager doctor`: what is wrong with this machine, and how to mend it.
+//! `lager doctor`: says what is wrong with this machine, and how to mend it.
 //!
 //! Each check looks at one thing and returns a finding. Only `--fix` changes anything: it removes
-//! what dead processes left on the bus. This process opens nothing of the bus that could make it
-//! wait.
+//! what dead processes left on the bus. This process opens nothing of the bus that could block it.
 
 mod ports;
 mod realtime;
@@ -15,14 +14,17 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use lager_ports::{Clock, NodeState};
+use lager_home::Clock;
+use lager_ports::NodeState;
+use lager_supervisor::console;
+use lager_topics::LAGER;
 use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
 use crate::overload::{self, Load};
 use crate::{diagnose, exit};
 
-/// Shared memory that a robot needs: 1 MiB when it runs alone, more with every observer.
+/// Shared memory that a robot needs, in MiB: 1 when it runs alone, more with every observer.
 const SHARED_MEMORY_MIB: u64 = 16;
 /// Open files that one process of the bus may need: each port and connection holds some.
 const OPEN_FILES: u64 = 4096;
@@ -30,7 +32,7 @@ const OPEN_FILES: u64 = 4096;
 /// The longest first clause that stands in a line of its own.
 const LONGEST_CLAUSE: usize = 76;
 
-/// How a thing stands.
+/// The result of a check.
 enum Finding {
     Good(String),
     /// It works, but not as well as it could.
@@ -41,18 +43,18 @@ enum Finding {
 
 use Finding::{Bad, Good, Hint};
 
-/// One check: what it looks at and how that stands.
+/// One check: its subject and its result.
 type Check = (&'static str, Finding);
 
-/// How long the bus may take to be looked at, and to be mended.
+/// How long it may take to look at the bus, and to mend it.
 const LOOK: Duration = Duration::from_millis(2_500);
 const MEND: Duration = Duration::from_secs(60);
-/// The same where the machine is overloaded.
+/// The same on an overloaded machine.
 const BUSY_LOOK: Duration = Duration::from_secs(20);
 
-/// Checks everything; fails when anything is bad.
+/// Runs all checks; fails when a result is bad.
 pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
-    // What a robot cannot do without, then what this one's body needs, then what makes it faster.
+    // First what every robot needs, then what this robot's body needs, then what makes it faster.
     let mut checks = vec![
         ("bus", bus_in_time(config, fix)),
         ("shared memory", shared_memory()),
@@ -66,13 +68,13 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
         ("calendar", calendar()),
     ];
     checks.extend(realtime::findings(config));
-    // Whatever keeps the robot from running comes first.
+    // Bad results come first.
     checks.sort_by_key(|(_, finding)| !matches!(finding, Bad(_)));
     let told = match as_json {
         true => json(&checks),
         false => text(&checks),
     };
-    crate::say(told.trim_end())?;
+    console::print(told.trim_end())?;
     Ok(match count(&checks, "BAD") {
         0 => ExitCode::SUCCESS,
         _ => exit::FAILED,
@@ -99,7 +101,7 @@ fn count(checks: &[Check], mark: &str) -> usize {
     of_that_mark.count()
 }
 
-/// Whether the dates of recordings can be believed; nothing else goes by the calendar.
+/// Whether the dates of recordings can be right. Nothing else uses the calendar.
 fn calendar() -> Finding {
     let now_ns = Clock::monotonic_ns().saturating_add_signed(Clock::unix_offset_ns());
     match lager_recorder::doubt(now_ns) {
@@ -110,12 +112,12 @@ fn calendar() -> Finding {
     }
 }
 
-/// A line for each check, then what to do about those that are not well, then how it stands.
+/// A line for each check, then what to do about the results that are not good, then a summary.
 fn text(checks: &[Check]) -> String {
     let mut lines = Vec::new();
     let mut advice = Vec::new();
     for (what, finding) in checks {
-        // The first clause says how it stands, the others why and what to do.
+        // The first clause is the result, the others say why and what to do.
         let (stands, rest) = finding
             .said()
             .split_once("; ")
@@ -168,7 +170,7 @@ fn json(checks: &[Check]) -> String {
     serde_json::json!({"ok": is_well, "findings": findings}).to_string()
 }
 
-/// A look at the bus, in a thread of its own: it may hang, and then that is the finding.
+/// Looks at the bus in a thread of its own. If the thread hangs, that is the result.
 fn bus_in_time(config: &Config, fix: bool) -> Finding {
     let (send, found) = mpsc::channel();
     let looked_at = config.clone();
@@ -240,13 +242,13 @@ fn open_files() -> Finding {
     let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
     if limit < OPEN_FILES {
         return Hint(format!(
-            "a process may open {limit} files; with many observers {OPEN_FILES} are wanted (ulimit -n {OPEN_FILES}, or LimitNOFILE= in the unit)"
+            "a process may open {limit} files; many observers need {OPEN_FILES} (ulimit -n {OPEN_FILES}, or LimitNOFILE= in the unit)"
         ));
     }
     Good(format!("a process may open {limit}"))
 }
 
-/// systemd removes a user's shared memory at logout unless told otherwise.
+/// systemd removes a user's shared memory at logout unless its configuration says otherwise.
 fn remove_ipc() -> Finding {
     let off = ["/etc/systemd/logind.conf", "/usr/lib/systemd/logind.conf"]
         .iter()
@@ -298,16 +300,16 @@ fn serial(config: &Config) -> Finding {
     }
 }
 
-/// The processes of the robot itself: its bridge has the ports open, and so has what stands for
-/// boards.
+/// The processes of the robot itself: its bridge, and the service that stands for the boards. They
+/// have the ports open.
 fn own(config: &Config) -> Vec<u32> {
     let bus = config.bus().ok();
-    let holders = bus.and_then(|bus| bus.place().ok()?.up().remove(&bus.robot));
+    let holders = bus.and_then(|bus| bus.home().ok()?.up().remove(&bus.unit));
     let holders = holders.into_iter().flatten();
     holders.map(|holder| holder.pid).collect()
 }
 
-/// Whether anybody else lets the robot have a core.
+/// Whether other programs leave the robot enough processor time.
 fn load() -> Finding {
     let Some(load) = Load::now() else {
         return Good("the kernel does not tell how busy this machine is".into());
@@ -365,14 +367,14 @@ fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
     };
     let mut removed = 0;
     if fix {
-        // What dead processes have registered with living ones is removed by a process that joins
-        // the bus.
+        // A process that joins the bus removes what dead processes have registered with living
+        // ones.
         if count(NodeState::Alive)? > 0 && count(NodeState::Stale)? > 0 {
             sweep_beside(&bus)?;
         }
-        removed = lager_ports::mend(&bus)?.removed;
+        removed = lager_home::mend(&bus.home()?, bus.application.kept).removed;
     }
-    if let Some(segment) = lager_ports::damaged(&bus)?.first() {
+    if let Some(segment) = lager_home::damaged(&bus.home()?).first() {
         return Ok(Bad(match users_of(segment).as_slice() {
             [] => format!(
                 "{} is damaged and nobody uses it; `lager doctor --fix` removes it",
@@ -387,14 +389,14 @@ fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
     }
     let alive = count(NodeState::Alive)?;
     let unknown = count(NodeState::Unknown)?;
-    let folder = bus.place()?.folder().display().to_string();
+    let folder = bus.home()?.folder().display().to_string();
     Ok(match count(NodeState::Stale)? {
         0 if unknown > 0 => Hint(format!(
             "{alive} processes are on the bus in {folder}, and {unknown} that belong to another user; one user should run all of a robot's services"
         )),
-        0 if alive == 0 && !lager_ports::other_places().is_empty() => Hint(format!(
+        0 if alive == 0 && !lager_home::other_homes(LAGER.family).is_empty() => Hint(format!(
             "nobody is on the bus in {folder}; {removed} files were removed; {}",
-            lager_ports::other_places()[0]
+            lager_home::other_homes(LAGER.family)[0]
         )),
         0 => Good(format!(
             "{alive} processes are on the bus in {folder}; {removed} files of dead ones were removed"
@@ -408,14 +410,14 @@ fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
     })
 }
 
-/// Lets another process join the bus, which sweeps, and gives it three seconds: it opens what may
-/// be damaged, and this one must go on.
+/// Starts another process that joins the bus, which sweeps it, and waits three seconds for it. That
+/// process opens files that may be damaged; this one must not hang.
 fn sweep_beside(bus: &lager_ports::BusConfig) -> Result<()> {
     const PATIENCE: Duration = Duration::from_secs(3);
     let mut child = Command::new(std::env::current_exe()?)
         .arg("--bus")
-        .arg(bus.place()?.folder())
-        .args(["--name", bus.robot.as_str(), "topic", "list"])
+        .arg(bus.home()?.folder())
+        .args(["--name", bus.unit.as_str(), "topic", "list"])
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::null())

@@ -1,5 +1,5 @@
-//! The service `lager emulator`: the boards' real images in their emulator, a child process, and
-//! what it tells of the world as samples of `truth/pose`.
+//! The service `lager emulator`: runs the boards' real images in their emulator, a child process,
+//! and publishes what that says of the world as `truth/pose`.
 //!
 //! ```text
 //!   lager emulator --[chip], [serial], [simulator]--> lager-emulator <==two ptys==> bridge
@@ -8,35 +8,36 @@
 //!         '<-- world/request -- what hands do, a line each on its standard input, and answered
 //! ```
 //! The emulator is GPL-3 and a program of its own: it and this process share a command line, two
-//! pipes and a file. It dies with this process, by the kernel's signal, and this process ends with
-//! it. The supervisor starts both again, and they resume the world from the last truth on the bus.
+//! pipes and a file. When this process dies, the kernel ends the emulator; when the emulator ends,
+//! this process ends too. The supervisor starts both again, and they resume the world from the last
+//! truth on the bus.
 //!
-//! **Safe state**: no emulator. Its steering board starts with motors off.
+//! **Safe state**: no emulator runs. A new one starts its steering board with motors off.
 
 use std::io::{Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lager_plant::{Edge, HandsOff, Pose, Warehouse};
-use lager_ports::{Bus, Cause, ChanceClock, Publisher, Shutdown};
-use lager_simulator::{Wish, answer, wish};
+use lager_home::ChanceClock;
+use lager_plant::{HandsOff, Report, Warehouse};
+use lager_ports::{Bus, Cause, Publisher};
+use lager_simulator::{answer, message, wish, world_state};
+use lager_supervisor::children::{PATIENCE, ends_within};
 use lager_topics::{Outcome, Truth, TruthPose, WorldAnswer, WorldAsk, WorldRequest};
+use lager_wake::Shutdown;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
-use serde::Deserialize;
-use serde_json::json;
 
 use crate::config::Config;
-use crate::supervisor::{PATIENCE, ends_within};
 
-/// How long a restarted emulator's last truth is waited for.
+/// How long to wait for the last truth of the emulator before.
 const KEPT_WAIT: Duration = Duration::from_millis(500);
-/// How long the emulator may take to do what hands do.
+/// How long the emulator may take for a request of a person's hands.
 const HANDS_WAIT: Duration = Duration::from_millis(500);
-/// For how long the emulator may tell nothing, though it could run, until that is said. The robot's
-/// time stands still meanwhile, so nothing is lost, and nobody else would notice.
+/// How long the emulator may be silent, in time in which it could have run, before a warning. The
+/// robot's time stands still meanwhile, so nothing is lost, and nobody else would notice.
 const STANDS: Duration = Duration::from_secs(5);
 /// How long to wait for a line before looking at the shutdown flag.
 const LOOK: Timespec = Timespec {
@@ -53,7 +54,7 @@ pub fn run(bus: &Bus, config: &Config, resume: bool, shutdown: &Shutdown) -> Res
     let truth = bus.publisher::<TruthPose>()?;
     let hands = bus.server::<WorldRequest>()?;
     let warehouse = config.warehouse()?;
-    let mut emulator = Emulator::start(config, kept.as_ref().map(|(truth, _)| truth))?;
+    let mut emulator = Emulator::start(config, &warehouse, kept.as_ref().map(|(truth, _)| truth))?;
     while !shutdown.is_requested() {
         let mut heard = Ok(true);
         hands.serve(|ask| {
@@ -70,42 +71,23 @@ pub fn run(bus: &Bus, config: &Config, resume: bool, shutdown: &Shutdown) -> Res
     Ok(())
 }
 
-/// The child, ended when dropped.
+/// The child process. Dropping it ends it.
 struct Emulator {
     child: Child,
     input: ChildStdin,
     output: ChildStdout,
     lines: Lines,
-    /// What became of the last thing that hands did.
-    answered: Option<Hands>,
-    /// How long it could run in all, what that was when it last told something, and whether that
-    /// it tells nothing has been said.
+    /// The result of the last request of a person's hands.
+    answered: Option<Result<(), HandsOff>>,
+    /// How long it could have run in all, the same at its last line, and whether the warning of its
+    /// silence has been given.
     could_run: ChanceClock,
     told_at: Duration,
     is_said: bool,
 }
 
-/// A line of the emulator.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Line {
-    Hand { hand: Hands },
-    Truth(Box<Truth>),
-}
-
-/// What became of what hands did.
-#[derive(Clone, Copy, Deserialize)]
-enum Hands {
-    Done,
-    NoEdge,
-    NoRoom,
-    RobotThere,
-    NothingThere,
-    Full,
-}
-
 impl Emulator {
-    fn start(config: &Config, kept: Option<&Truth>) -> Result<Self> {
+    fn start(config: &Config, warehouse: &Warehouse, kept: Option<&Truth>) -> Result<Self> {
         let parts = config.chip.parts(config.serial.baud)?;
         let mut command = Command::new(&parts.emulator);
         command
@@ -117,7 +99,7 @@ impl Emulator {
             .arg(&config.serial.sensor)
             .arg("--steering-link")
             .arg(&config.serial.steering)
-            .args(["--warehouse", &config.warehouse])
+            .args(["--warehouse", &serde_json::to_string(warehouse)?])
             .args(["--seed", &config.simulator.seed.to_string()])
             .args(["--obstacles", &config.simulator.obstacles.to_string()])
             .args(["--baud", &config.serial.baud.to_string()])
@@ -151,26 +133,22 @@ impl Emulator {
             answered: None,
         };
         if let Some(kept) = kept {
-            let world = serde_json::to_string(kept)?;
+            let world = serde_json::to_string(&world_state(kept))?;
             writeln!(emulator.input, "{world}").context("the emulator takes no world")?;
         }
         Ok(emulator)
     }
 
-    /// Lets the emulator do what a person's hands would do; whether it still runs, and the answer.
+    /// Makes the emulator do what a person's hands would do. Returns whether it still runs, and its
+    /// answer.
     fn obey(
         &mut self,
         warehouse: &Warehouse,
         ask: &WorldAsk,
         truth: &Publisher<TruthPose>,
     ) -> (Result<bool>, WorldAnswer) {
-        let between = |Edge { from, to }: Edge| json!({ "between": [from, to] });
         let hand = match wish(warehouse, ask) {
-            Ok(Wish::Place(Pose { x, y, heading })) => {
-                json!({ "place": { "x_mm": x, "y_mm": y, "heading_rad": heading } })
-            }
-            Ok(Wish::Put(edge)) => json!({ "put": between(edge) }),
-            Ok(Wish::Take(edge)) => json!({ "take": between(edge) }),
+            Ok(hand) => hand,
             Err(refused) => return (Ok(true), refused),
         };
         let unanswered = WorldAnswer {
@@ -178,8 +156,9 @@ impl Emulator {
             ..WorldAnswer::default()
         };
         self.answered = None;
-        // Where it has ended, the next line that does not come will tell.
-        if writeln!(self.input, "{hand}").is_err() {
+        // If it has ended, the next line is missing and shows that.
+        let said = serde_json::to_string(&hand).map(|line| writeln!(self.input, "{line}"));
+        if !matches!(said, Ok(Ok(()))) {
             return (Ok(true), unanswered);
         }
         let start = Instant::now();
@@ -189,19 +168,11 @@ impl Emulator {
                 ended => return (ended, unanswered),
             }
         }
-        let tried = match self.answered {
-            Some(Hands::Done) => Ok(()),
-            Some(Hands::NoEdge) => Err(HandsOff::NoEdge),
-            Some(Hands::NoRoom) => Err(HandsOff::NoRoom),
-            Some(Hands::RobotThere) => Err(HandsOff::RobotThere),
-            Some(Hands::NothingThere) => Err(HandsOff::NothingThere),
-            Some(Hands::Full) => Err(HandsOff::Full),
-            None => return (Ok(true), unanswered),
-        };
-        (Ok(true), answer(tried))
+        let answered = self.answered.take().map_or(unanswered, answer);
+        (Ok(true), answered)
     }
 
-    /// Says once that the emulator tells nothing.
+    /// Warns once that the emulator is silent.
     fn watch(&mut self) {
         let stands = self.could_run.look(STANDS) - self.told_at;
         if stands >= STANDS && !core::mem::replace(&mut self.is_said, true) {
@@ -212,7 +183,7 @@ impl Emulator {
         }
     }
 
-    /// Publishes what the emulator tells, waiting for it a moment; whether it still runs.
+    /// Waits a moment for the emulator's lines and publishes them. Returns whether it still runs.
     fn pass_on(&mut self, truth: &Publisher<TruthPose>) -> Result<bool> {
         let mut fds = [PollFd::new(&self.output, PollFlags::IN)];
         match poll(&mut fds, Some(&LOOK)) {
@@ -232,13 +203,13 @@ impl Emulator {
         while let Some(line) = self.lines.next() {
             let line = serde_json::from_slice(&line).with_context(|| {
                 format!(
-                    "the emulator tells what this program does not know (`{}`); build both anew",
+                    "the emulator says something that this program does not know (`{}`); build both again",
                     String::from_utf8_lossy(&line)
                 )
             })?;
             match line {
-                Line::Hand { hand } => self.answered = Some(hand),
-                Line::Truth(world) => truth.send(Cause::OWN, *world)?,
+                Report::Hand(hand) => self.answered = Some(hand),
+                Report::Truth(world) => truth.send(Cause::OWN, message(&world))?,
             }
         }
         Ok(count > 0)
@@ -255,7 +226,7 @@ impl Drop for Emulator {
     }
 }
 
-/// Bytes as they come, lines as they are complete.
+/// Collects bytes and returns whole lines.
 #[derive(Default)]
 struct Lines(Vec<u8>);
 

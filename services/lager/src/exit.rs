@@ -1,40 +1,44 @@
-//! The exit codes of `lager`, as `lager --help` documents them. Wrong usage (2) is the command
-//! line parser's, and that of whatever reads an argument's meaning after it: [`Usage`].
+//! The exit codes of `lager`; `lager --help` lists them. Wrong usage (2) comes from the parser of
+//! the command line, or from later checks of an argument's meaning: [`Usage`].
 
 use std::process::ExitCode;
 
-use lager_ports::{LockError, OpenError, PortError};
+use lager_bridge::BridgeError;
+use lager_home::LockError;
+use lager_ports::{OpenError, PortError};
+use lager_supervisor::children::TRY_AGAIN;
+use lager_supervisor::signals::INTERRUPTED;
 
 /// The failure's reason is on standard error.
 pub const FAILED: ExitCode = ExitCode::FAILURE;
 
-/// What was asked for makes no sense, whatever the robot does.
+/// The request makes no sense, whatever the robot does.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Usage(pub String);
 
-/// Somebody wished for the end before the work was done.
+/// Somebody ended the program before its work was done.
 #[derive(Debug, thiserror::Error)]
 #[error("interrupted")]
 pub struct Interrupted;
 
-/// The exit code after [`Interrupted`], as shells have it for Ctrl-C.
-pub const INTERRUPTED: i32 = 130;
-
-/// The exit code of a service that could not join the bus and may do better next time, as
-/// `sysexits.h` has it. Only its supervisor sees it.
-pub const TRY_AGAIN: i32 = 75;
-
-/// Whether another attempt may succeed: others were just making or removing what it wanted, which
-/// on a busy machine may take longer than it waits for.
+/// Whether another attempt may succeed: other processes were just making or removing a file that
+/// this one needed. On a busy machine that may take longer than this one waits.
 fn may_try_again(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         matches!(cause.downcast_ref(), Some(OpenError::Transport { .. }))
             || matches!(
-                cause.downcast_ref(),
+                port_error(cause),
                 Some(PortError::Busy { .. } | PortError::Transport { .. })
             )
     })
+}
+
+fn port_error<'a>(cause: &'a (dyn std::error::Error + 'static)) -> Option<&'a PortError> {
+    match cause.downcast_ref() {
+        Some(BridgeError::Port(error)) => Some(error),
+        _ => cause.downcast_ref(),
+    }
 }
 
 /// The exit code of a service's error.
@@ -63,12 +67,12 @@ pub fn code(error: &anyhow::Error) -> ExitCode {
     }
 }
 
-/// Whether the machine may be the cause of an error, rather than the user's request.
+/// Whether the machine may have caused an error, and not the user's request.
 pub fn may_have_a_cause(error: &anyhow::Error) -> bool {
     !error.is::<Usage>() && !error.is::<Interrupted>() && !error.is::<LockError>()
 }
 
-/// The mission ended without every product delivered.
+/// The mission ended, but not every product was delivered.
 pub fn not_delivered() -> ExitCode {
     ExitCode::from(3)
 }

@@ -1,16 +1,18 @@
-//! `lager gag`: a person in a terminal as the GaG of a station, in the document's grammar alone.
+//! `lager gag`: a person at a terminal is the GaG of a station. It speaks only the document's
+//! language.
 //!
 //! ```text
 //!   the station asks        fetchprod        what is to be fetched? its number
 //!   the person types        3                or `fetchprod 3`
 //!   the station is told     fetchprod 3
 //! ```
-//! What is typed waits until it is asked for, so a whole session may come from a pipe. What is no
-//! answer is refused here, with the column, and not sent.
+//! A line that the person types waits until the station asks for it, so a whole session may come
+//! from a pipe. If a line is not an answer, this program refuses it, names the column, and does not
+//! send it.
 //!
-//! A stop drops all commands that wait and a `pickup_done` behind them (C5). It is said at once, as
-//! nobody asks for commands while a robot turns or moves its arm. It is the next answer as well,
-//! for a station that passes over what it has not asked for.
+//! A stop drops all commands that wait, and a `pickup_done` behind them (C5). This program sends a
+//! stop at once, because a robot that turns or moves its arm asks for no commands. A station may
+//! ignore what it has not asked for, so the stop is also the next answer.
 //!
 //! [`Desk`] is pure: lines in, lines out. The shell around it waits for the terminal and the
 //! socket.
@@ -26,38 +28,39 @@ use lager_lines::conversation::Held;
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
 use lager_lines::splitter::{LineError, LineSplitter};
 use lager_lines::to_line;
-use lager_ports::Shutdown;
+use lager_supervisor::console;
+use lager_supervisor::runtime_folder::RuntimeFolder;
+use lager_wake::Shutdown;
 use lager_wire::OperatorCommand;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::config::Config;
-use crate::runtime::RuntimeFolder;
 
-/// How often the wish to end is looked at when nothing comes.
+/// How often it checks for its end when nothing comes.
 const GLANCE: Timespec = Timespec {
     tv_sec: 0,
     tv_nsec: 100_000_000,
 };
-/// What may wait to be asked for, in lines.
+/// How many lines may wait until the station asks for them.
 const MOST: usize = 32;
 
-/// What a GaG knows: what is asked, and what is to be answered when it is.
+/// The state of a GaG: the open question, and the answers that wait.
 #[derive(Debug, Default)]
 struct Desk {
     held: Held,
     answers: VecDeque<Answer>,
-    /// What is said to the station.
+    /// Lines for the station.
     said: Vec<String>,
-    /// What is told to the person.
+    /// Lines for the person.
     told: Vec<String>,
 }
 
 impl Desk {
-    /// The station has said a line.
+    /// The station has sent a line.
     fn heard(&mut self, line: &str) {
         match Request::read(line) {
             Ok(Request::Query(query)) => {
-                // The station asks again to see that this one reads.
+                // The station repeats its question to see that this program still reads.
                 let is_again = self.held.get() == Some(query);
                 self.held.ask(query);
                 if !self.answer() && !is_again {
@@ -99,11 +102,12 @@ impl Desk {
             return self.told.push(why);
         }
         if !self.answer() {
-            self.told.push("it waits until it is asked for".into());
+            self.told
+                .push("it waits until the station asks for it".into());
         }
     }
 
-    /// A whole answer, or what is missing of the one that is asked for.
+    /// A whole answer, or the missing part of the answer to the open question.
     fn read(&self, line: &str) -> Result<Answer, String> {
         let whole = Answer::read(line);
         let starts = |query: &Query| line.split(' ').next() == Some(query.as_str());
@@ -116,7 +120,7 @@ impl Desk {
         }
     }
 
-    /// Answers with the first that fits what is asked; whether there was one.
+    /// Gives the first waiting answer that fits the open question. Returns whether there was one.
     fn answer(&mut self) -> bool {
         let Some(query) = self.held.get() else {
             return false;
@@ -140,7 +144,7 @@ impl Desk {
     }
 }
 
-/// A peer's text, without what would steer the terminal.
+/// A text of the other side, without characters that control the terminal.
 fn shown(text: &str) -> String {
     let mut shown = String::new();
     for character in text.chars() {
@@ -177,7 +181,7 @@ pub fn run(config: &Config, socket: Option<PathBuf>, shutdown: &Shutdown) -> Res
         let path = path.display();
         format!("no station listens at {path}; `lager up` or `lager station` starts one, and --socket names another")
     })?;
-    crate::say(&format!(
+    console::print(&format!(
         "you are the GaG at {}; Ctrl-D ends it",
         path.display()
     ))?;
@@ -185,9 +189,12 @@ pub fn run(config: &Config, socket: Option<PathBuf>, shutdown: &Shutdown) -> Res
 }
 
 fn usual(config: &Config) -> Result<PathBuf> {
-    if let Some(running) = RuntimeFolder::running(config)? {
+    if let Some(running) = config.of_running_robot()? {
         let own = running.station.gag.clone();
-        let own = own.map_or_else(|| RuntimeFolder::gag(&running), Ok)?;
+        let own = own.map_or_else(
+            || running.bus().and_then(|bus| RuntimeFolder::gag(&bus)),
+            Ok,
+        )?;
         if own.exists() {
             return Ok(own);
         }
@@ -222,7 +229,7 @@ fn converse(path: &Path, mut stream: UnixStream, shutdown: &Shutdown) -> Result<
             }
         }
         if ready.get(1) == Some(&true) {
-            // Whoever has typed too much, or no text, goes on driving.
+            // A person who has typed too much, or bytes that are not text, goes on driving.
             let typed = |line: Result<&str, LineError>| {
                 match line {
                     Ok(line) => desk.typed(line),
@@ -230,15 +237,15 @@ fn converse(path: &Path, mut stream: UnixStream, shutdown: &Shutdown) -> Result<
                 }
                 Ok(())
             };
-            // Past the buffer of `Stdin`, which `poll` does not see.
+            // Read the file itself: `poll` does not see what is in `Stdin`'s buffer.
             let mut stdin = std::fs::File::from(stdin.as_fd().try_clone_to_owned()?);
             is_listening = take(&mut stdin, &mut from_person, typed)?;
         }
         for line in desk.told.drain(..) {
-            crate::say(&line)?;
+            console::print(&line)?;
         }
         for line in desk.said.drain(..) {
-            crate::say(&format!("  > {}", line.trim_end()))?;
+            console::print(&format!("  > {}", line.trim_end()))?;
             stream
                 .write_all(line.as_bytes())
                 .with_context(|| format!("the station at {} has gone", path.display()))?;
@@ -247,7 +254,7 @@ fn converse(path: &Path, mut stream: UnixStream, shutdown: &Shutdown) -> Result<
     Ok(())
 }
 
-/// Takes what has come, line by line; whether there may be more.
+/// Takes the bytes that have come, line by line. Returns whether more may come.
 fn take(
     from: &mut impl Read,
     splitter: &mut LineSplitter,

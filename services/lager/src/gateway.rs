@@ -1,25 +1,27 @@
-//! `lager gateway`: what the robot shows to programs outside, until it is told to end.
+//! `lager gateway`: shows the robot to programs outside, until somebody ends it.
 
 use anyhow::{Context, Result};
 use lager_gateway::{Addresses, Gateway, GatewayError, USUAL_METRICS};
-use lager_ports::{Bus, Shutdown};
+use lager_ports::Bus;
+use lager_supervisor::Service;
+use lager_supervisor::console;
+use lager_supervisor::runtime_folder::RuntimeFolder;
+use lager_wake::Shutdown;
 
 use crate::cli::GatewayArgs;
 use crate::config::Config;
 use crate::exit;
-use crate::patience::Patience;
 use crate::reach;
-use crate::runtime::RuntimeFolder;
-use crate::services::Service;
+use crate::time_limit::TimeLimit;
 
-/// The configuration it runs with, and where it answers. Started beside a robot that is up it takes
-/// over that robot's clock, in which the boards' silence counts.
+/// The configuration that it runs with, and where it answers. If it starts beside a robot that is
+/// up, it takes over that robot's clock, because the boards' silence counts in that time.
 ///
 /// # Errors
 /// The robot's folder cannot be read, or this program cannot speak to Foxglove.
 pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, Addresses)> {
     let mut joined = config.clone();
-    if let Some(running) = RuntimeFolder::running(config)? {
+    if let Some(running) = config.of_running_robot()? {
         joined.speed = running.speed;
         joined.chip.clock = running.chip.clock;
     }
@@ -35,37 +37,38 @@ pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, Addresses
     Ok((joined, wanted))
 }
 
-/// Runs it. A call into the bus that hangs ends the process, and it is started again.
+/// Runs it. If a call into the bus hangs, the process ends, and `up` starts another one.
 ///
 /// # Errors
-/// An address cannot be had, or the bus cannot be read.
+/// An address is not free, or the bus cannot be read.
 pub fn run(bus: &Bus, config: &Config, wanted: Addresses, shutdown: &Shutdown) -> Result<()> {
-    let gateway = Gateway::open(wanted, bus.robot().as_str())?;
+    let gateway = Gateway::open(wanted, bus.unit().as_str())?;
     if config.gateway.addresses() != wanted {
-        // Nobody else has said where it is.
+        // Nobody else has said where it answers.
         for line in told(gateway.addresses()) {
-            crate::say(&line)?;
+            console::print(&line)?;
         }
     }
-    // The wish to end is heeded here and not by the watch: there is nothing to wait for.
-    let patience = Patience::new(config, &Shutdown::new())?;
-    let signs = RuntimeFolder::live_as(config, Service::Gateway)?;
+    // The gateway itself ends when asked, without the watchdog: it has nothing to wait for.
+    let patience = TimeLimit::new(config, &Shutdown::new())?;
+    let signs = RuntimeFolder::live_as(&config.bus()?, Service::Gateway)?;
     let watchdog = patience.watchdog.showing(signs);
     Ok(gateway.run(bus, &watchdog, shutdown)?)
 }
 
-/// Refuses what a gateway of `up` could not do, before anything runs, and says where what will be.
+/// Checks, before anything runs, whether a gateway of `up` could work. Returns where it will
+/// answer.
 ///
 /// # Errors
-/// An address cannot be had, or this program cannot speak to Foxglove.
+/// An address is not free, or this program cannot speak to Foxglove.
 pub fn promise(config: &Config) -> Result<Vec<String>> {
     let wanted = config.gateway.addresses();
-    // Each is opened again in a moment, by the gateway.
+    // The gateway opens each of them again in a moment.
     wanted.may_be_had().map_err(refused)?;
     Ok(told(wanted))
 }
 
-/// What this program cannot do makes no sense to ask for.
+/// Refuses what this program was not built for.
 fn refused(error: GatewayError) -> anyhow::Error {
     match error {
         GatewayError::NoFoxglove => exit::Usage(error.to_string()).into(),

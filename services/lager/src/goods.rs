@@ -1,4 +1,4 @@
-//! Goods as people call them: which number the robot is told for a name.
+//! The names of goods: finds the number for a name.
 //!
 //! ```text
 //!   who describes the warehouse     where its names are found
@@ -8,26 +8,28 @@
 //! ```
 
 use anyhow::{Result, bail};
+use lager_floor::ProductId;
 use lager_lines::Called;
-use lager_station::{Warehouse, load};
+use lager_plant::Warehouse;
+use lager_station::{find, load, told};
 
 use crate::config::Config;
 
-/// The number of what a person calls so, for the robot that runs with `config`.
+/// The number of the product with this name or number, for the robot that runs with `config`.
 ///
 /// # Errors
-/// Nothing there has that name, or names are not known here.
-pub fn number(config: &Config, called: &Called) -> Result<i32> {
+/// No product has that name, or nobody here knows names.
+pub fn number(config: &Config, called: &Called) -> Result<ProductId> {
     match called {
-        Called::Number(number) => Ok(number.get()),
-        Called::Name(_) => Ok(described(config)?.find(called)?.get()),
+        Called::Number(number) => Ok(*number),
+        Called::Name(_) => Ok(find(&described(config)?, called)?),
     }
 }
 
-/// The warehouse with the names of its goods, as the robot that runs with `config` is told it.
+/// The warehouse with the names of its goods, as the robot that runs with `config` knows it.
 ///
 /// # Errors
-/// It is not known here.
+/// Nobody here knows it.
 pub fn described(config: &Config) -> Result<Warehouse> {
     let kept = &config.station.warehouse;
     if let Some(kept) = kept.as_ref().filter(|kept| kept.is_file()) {
@@ -35,28 +37,20 @@ pub fn described(config: &Config) -> Result<Warehouse> {
     }
     if config.station.wanted && kept.is_none() {
         bail!(
-            "the names of goods are known to the external computer alone, which is not the robot's own; give the number, which `lager map` shows"
+            "only the external computer knows the names of goods, and it is not the robot's own; give the number, which `lager map` shows"
         );
     }
     configured(config)
 }
 
-/// The configured warehouse as a station describes it.
+/// The configured warehouse, if a station can tell robots of it.
 ///
 /// # Errors
-/// No station can describe it.
+/// No station can.
 pub fn configured(config: &Config) -> Result<Warehouse> {
-    described_by(&config.warehouse()?)
-}
-
-/// A simulated world's warehouse as a station describes it: both read the same file.
-///
-/// # Errors
-/// No station can describe it.
-pub fn described_by(warehouse: &lager_plant::Warehouse) -> Result<Warehouse> {
-    let described: Warehouse = toml::from_str(&toml::to_string(warehouse)?)?;
-    described.check()?;
-    Ok(described)
+    let warehouse = config.warehouse()?;
+    told(&warehouse)?;
+    Ok(warehouse)
 }
 
 #[cfg(test)]
@@ -65,19 +59,14 @@ mod tests {
 
     #[test]
     fn the_warehouse_file_of_the_readme_is_one_for_station_and_simulated_world() {
-        let readme = include_str!("../../../README.md");
+        let readme = include_str!("../../station/README.md");
         let (_, rest) = readme
             .split_once("```toml\n# hall.toml")
             .expect("the example");
         let (example, _) = rest.split_once("```").expect("its end");
         let text = format!("# hall.toml{example}");
-        let world: lager_plant::Warehouse = toml::from_str(&text).expect("a warehouse");
-        world.validate().expect("it can be built");
-        let told: Warehouse = toml::from_str(&text).expect("the same");
-        told.check().expect("it can be told");
-        assert_eq!(
-            described_by(&world).expect("the same").products,
-            told.products
-        );
+        let warehouse: Warehouse = toml::from_str(&text).expect("a warehouse");
+        warehouse.validate().expect("it can be built");
+        told(&warehouse).expect("it can be told");
     }
 }

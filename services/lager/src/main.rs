@@ -7,13 +7,11 @@
 )]
 
 mod address;
-mod attend;
 mod bag;
 mod bench;
 mod cli;
 mod comm;
 mod config;
-mod cut_short;
 mod diagnose;
 mod doctor;
 mod emulator;
@@ -21,66 +19,54 @@ mod exit;
 mod gag;
 mod gateway;
 mod goods;
-mod hands;
-mod keepers;
-mod kept;
-mod map;
+mod hint;
 mod meant;
-mod mission;
-mod outcome;
 mod overload;
-mod patience;
 mod reach;
 mod realtime;
-mod report;
-mod runtime;
-mod services;
-mod signals;
+mod sigbus;
 mod simulate;
 mod stack;
-mod state;
 mod station;
 mod steer;
 mod stop;
-mod supervisor;
-mod terminal;
+mod time_limit;
 mod top;
 mod topic;
+mod traces;
 mod up;
-mod voice;
-mod words;
 
-use std::io::Write;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::FromArgMatches;
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
-use lager_ports::{Bus, Shutdown, Watchdog};
+use lager_ports::Bus;
 use lager_simulator::SimulatorConfig;
-use lager_topics::{Mode, Role};
+use lager_supervisor::Parent;
+use lager_supervisor::Service;
+use lager_supervisor::attendant::{self, AttendantConfig};
+use lager_supervisor::children::adopt;
+use lager_supervisor::console;
+use lager_supervisor::runtime_folder::RuntimeFolder;
+use lager_supervisor::signals;
+use lager_topics::Role;
+use lager_wake::{Shutdown, Watchdog};
 use lager_wire::OperatorCommand;
 
-use crate::cli::{
-    Button, Cli, Command, GlobalArgs, MapChange, ModeName, ObstacleChange, QueueChange,
-    ServiceArgs, TopicArgs, TopicCommand,
-};
-use crate::config::{ChipSection, Config};
-use crate::patience::Patience;
-use crate::runtime::RuntimeFolder;
-use crate::services::Service;
-use crate::steer::{Obstacle, Operator};
-use crate::supervisor::Parent;
-use crate::voice::Speaker;
+use crate::cli::{Cli, Command, GlobalArgs, ServiceArgs, TopicArgs, TopicCommand};
+use crate::config::{Body, ChipSection, Config};
+use crate::steer::Operator;
+use crate::time_limit::TimeLimit;
+use crate::traces::Speaker;
 
 fn main() -> ExitCode {
-    voice::say_of_faults(Speaker::Tool);
+    traces::say_of_faults(Speaker::Tool);
     if let Err(error) = stack::must_suffice() {
-        voice::say(&Speaker::Tool.line(&format!("{error:#}")));
+        console::complain(&Speaker::Tool.line(&format!("{error:#}")));
         return exit::code(&error);
     }
-    lager_benches::run_if_asked();
     let cli = Cli::from_arg_matches(&cli::help::command().get_matches())
         .unwrap_or_else(|error| error.exit());
     let mut speaker = Speaker::Tool;
@@ -90,9 +76,9 @@ fn main() -> ExitCode {
     let ended = begun.and_then(|config| {
         looked_at = Some(config.clone());
         let own = own_voice(&cli.command, &config);
-        voice::begin(own, &config.log)?;
-        voice::say_of_faults(own);
-        // `up` has no robot to speak for as long as it can end with an error.
+        traces::begin(own, &config.log)?;
+        traces::say_of_faults(own);
+        // While `up` can still end with an error, it has no robot to speak for.
         if !matches!(cli.command, Command::Up(_)) {
             speaker = own;
         }
@@ -101,14 +87,14 @@ fn main() -> ExitCode {
     match ended {
         Ok(code) => code,
         Err(error) => {
-            voice::say(&speaker.line(&format!("{error:#}")));
+            console::complain(&speaker.line(&format!("{error:#}")));
             if exit::may_have_a_cause(&error) {
                 let causes = looked_at.iter().flat_map(diagnose::causes);
-                let busy = patience::was_in_vain(&error)
+                let busy = time_limit::was_in_vain(&error)
                     .then(overload::cause)
                     .flatten();
                 for cause in causes.chain(busy) {
-                    voice::say(&speaker.line(&cause));
+                    console::complain(&speaker.line(&cause));
                 }
             }
             match is_supervised {
@@ -119,7 +105,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// As whom this process speaks on the terminal.
+/// Whose name this process uses on the terminal.
 fn own_voice(command: &Command, config: &Config) -> Speaker {
     match as_whom(command) {
         Some((who, parent)) => Speaker::service(who, parent, config),
@@ -127,7 +113,7 @@ fn own_voice(command: &Command, config: &Config) -> Speaker {
     }
 }
 
-/// The part of a robot that a command runs, and who has started it.
+/// The robot's service that a command runs, and the process that started it.
 fn as_whom(command: &Command) -> Option<(&'static str, Option<Parent>)> {
     Some(match command {
         Command::Up(_) => ("up", None),
@@ -149,8 +135,8 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
     }
     let shutdown = Shutdown::new();
     signals::end_in_order(&shutdown)?;
-    // Whatever follows is a tool, and ends at the first Ctrl-C.
-    let patience = || Patience::new(&config, &shutdown);
+    // All other commands are tools, and end at the first Ctrl-C.
+    let patience = || TimeLimit::new(&config, &shutdown);
     let operator = || {
         diagnose::must_be_up(&config)?;
         Operator::new(&config, patience()?)
@@ -162,7 +148,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return simulate::run(&config, &args);
         }
         Command::Attend(args) => {
-            attend::run(&config, args.parent, &shutdown)?;
+            attend(&config, args.parent, &shutdown)?;
             return Ok(ExitCode::SUCCESS);
         }
         Command::Bridge(args) => {
@@ -213,7 +199,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Emulator(args) => {
-            // The emulator is what the clock follows, so its own bus has another clock.
+            // The emulator makes the time that the clock shows, so its own bus needs another clock.
             let resting = Config {
                 chip: ChipSection {
                     clock: None,
@@ -275,27 +261,23 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         }
         Command::Completions { shell } => return Ok(topic::completions(shell)),
         Command::Bag(args) => return bag::run(&config, args, &shutdown),
-        Command::Bench(args) => {
-            // It has a bus of its own and gives up by itself; on Ctrl-C it takes the time to sweep.
-            cut_short::say_so()?;
-            bench::run(&args)?
-        }
+        Command::Bench { arguments } => return Err(bench::become_it(&arguments)),
         Command::Doctor {
             fix,
             json,
             realtime,
         } => {
             realtime.apply(&mut config.realtime);
-            Patience::new(&config, &shutdown)?;
+            TimeLimit::new(&config, &shutdown)?;
             return doctor::run(&config, fix, json);
         }
         Command::Config { iceoryx2: true } => config.bus()?.iceoryx2_toml()?.trim_end().to_owned(),
         Command::Config { iceoryx2: false } => {
-            // What `up` would refuse is no configuration to go by.
+            // Do not show a configuration that `up` would refuse.
             config.warehouse()?;
             config.documented().trim_end().to_owned()
         }
-        // Before anything is asked of the bus, which need not be there.
+        // Before any call into the bus, which may not exist.
         Command::Stop
         | Command::Drive {
             command: OperatorCommand::Stop,
@@ -305,66 +287,18 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             stop::run(&config)?
         }
         Command::Drive { command, seconds } => operator()?.drive(command, seconds)?,
-        Command::Arm { command } => operator()?.arm(command)?,
         Command::Resume => {
-            // As it is when the person says so: one that comes later is not released.
+            // Take the stop of this moment: a later stop must not be released.
             let before = stop::current(&config)?;
             operator()?.resume(&config, before)?
         }
-        Command::Mode { mode } => operator()?.mode(match mode {
-            ModeName::Manual => Mode::Manual,
-            ModeName::Autonomous => Mode::Autonomous,
-        })?,
-        Command::Fetch { product } => operator()?.fetch(&product)?,
-        Command::Cancel { id } => operator()?.cancel(id)?,
-        Command::Map { change: None } => operator()?.map()?,
-        Command::Map {
-            change: Some(MapChange::Back { product }),
-        } => operator()?.back(product.as_ref())?,
-        Command::Queue { change } => {
-            let operator = operator()?;
-            match change {
-                None => operator.orders()?,
-                Some(QueueChange::Add { product }) => operator.order(&product)?,
-                Some(QueueChange::Cancel { id }) => operator.cancel(id)?,
-                Some(QueueChange::Up { id }) => operator.move_up(id)?,
-                Some(QueueChange::Clear) => operator.clear_queue()?,
-            }
-        }
-        Command::Pick { by } => operator()?.pick(by.into())?,
-        Command::Picked { force } => operator()?.picked(force)?,
-        Command::Reset => operator()?.reset()?,
-        Command::Press {
-            button: Button::Reset,
-        } => operator()?.reset()?,
-        Command::Press {
-            button: Button::Switch,
-        } => operator()?.switch()?,
-        Command::Place { place } => operator()?.place(place)?,
-        Command::Obstacle { change } => {
-            let operator = operator()?;
-            match change {
-                None => operator.obstacles()?,
-                Some(ObstacleChange::Put { way }) => operator.obstacle(Obstacle::Put(way))?,
-                Some(ObstacleChange::Take { way }) => operator.obstacle(Obstacle::Take(way))?,
-            }
-        }
-        Command::Gains { p, d } => operator()?.gains(p, d)?,
-        Command::Calibrate => operator()?.calibrate()?,
+        Command::Ordered(ordered) => operator()?.order(&ordered)?,
     };
-    say(&said)?;
+    console::print(&said)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// A line on standard output. A reader that has gone, as after `| head`, is no error.
-fn say(line: &str) -> Result<()> {
-    match writeln!(std::io::stdout(), "{line}") {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
-    }
-}
-
-/// The configuration file with the flags of every subcommand on top.
+/// The configuration file, with the flags of every subcommand on top.
 fn configure(global: &GlobalArgs) -> Result<Config> {
     let mut config = Config::load(global.config.as_deref())?;
     if let Some(name) = &global.name {
@@ -384,7 +318,24 @@ fn configure(global: &GlobalArgs) -> Result<Config> {
     Ok(config)
 }
 
-/// Runs one service in this process until it is told to end.
+/// Runs the attendant of the `up` that is `parent`.
+fn attend(config: &Config, parent: Option<Parent>, shutdown: &Shutdown) -> Result<()> {
+    let warehouse = match config.station.wanted {
+        true => None,
+        false => {
+            let (side, grid, products) = config.warehouse()?.told()?;
+            Some(lager_topics::WarehouseMap::new(side, grid, &products))
+        }
+    };
+    let attended = AttendantConfig {
+        bus: config.bus()?,
+        is_real: config.body == Body::Serial,
+        warehouse,
+    };
+    attendant::run(&attended, parent, shutdown)
+}
+
+/// Runs one service in this process until somebody ends it.
 fn service(
     config: &Config,
     role: Role,
@@ -395,28 +346,26 @@ fn service(
     let span = tracing::info_span!("service", service = %role, robot = %config.name);
     let _service = span.entered();
     let start = tracing::info_span!("start").entered();
-    // Before the first thread: all of them inherit it.
+    // Before the first thread, so that all threads inherit it.
     let mut wanted = config.realtime.wanted(role);
     args.apply(&mut wanted);
     wanted.apply()?;
     config.refuse_starvation(&[(role, wanted)])?;
     if let Some(parent) = args.parent {
-        supervisor::adopt(parent, shutdown)?;
+        adopt(parent, shutdown)?;
     }
     let bus = config.bus()?;
-    // Two of a kind would both steer; a supervised successor may meet its predecessor's end.
-    let _lock = bus.place()?.lock(&bus.robot, role)?;
-    // The attendant listens whether it lives: for what it publishes, or for these signs.
+    // Two of a kind would both steer. A new service may have to wait for the end of the old one.
+    let _lock = bus.home()?.lock(&bus.unit, role)?;
+    // The attendant checks whether the service lives, by its samples or by these signs.
     let watchdog = match role {
-        Role::Comm => {
-            comm::watch(shutdown)?.showing(RuntimeFolder::live_as(config, Service::Comm)?)
-        }
+        Role::Comm => comm::watch(shutdown)?.showing(RuntimeFolder::live_as(&bus, Service::Comm)?),
         _ => Watchdog::default(),
     };
     let bus = watchdog.over("joining the bus", || Bus::open(&bus, role))?;
     drop(start);
     let result = run(&bus, args.resume, &watchdog);
-    // A killed supervisor left its node behind; the last process to go sweeps it.
+    // A killed supervisor left its node on the bus; the last process removes it.
     watchdog.over("sweeping the bus", || bus.sweep());
     result
 }

@@ -1,19 +1,19 @@
-//! What somebody has meant who has mistyped a name, as a part of the sentence that refuses it.
+//! Suggests the right name for a mistyped one, as a part of the sentence that refuses it.
 
 use lager_lines::nearest;
 use lager_topics::{TOPICS, UnknownTopic};
 
-/// Which of `candidates` may have been meant; nothing if none is like it.
+/// The one of `candidates` that the user may have meant; empty if none is similar.
 pub fn meant<'a>(text: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
     let near = nearest(text, candidates);
     near.map(|name| format!(" (did you mean `{name}`?)"))
         .unwrap_or_default()
 }
 
-/// That there is no such topic, and which one may have been meant, of the table or of `others`.
+/// Says that there is no such topic, and suggests one of the table or of `others`.
 pub fn unknown_topic<'a>(text: &'a str, others: impl IntoIterator<Item = &'a str>) -> String {
     let all = || TOPICS.iter().map(|entry| entry.name);
-    // Whoever leaves the family out means the topic all the same.
+    // A name without its first part still gets a suggestion.
     let by_end = || all().find(|name| name.rsplit('/').next() == Some(text));
     let unknown = UnknownTopic(text.to_owned());
     match nearest(text, all().chain(others)).or_else(by_end) {

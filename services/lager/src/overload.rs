@@ -1,40 +1,40 @@
-//! Whether this machine is so busy that a robot's services get a core too late, and who keeps it
-//! busy.
+//! Finds out whether this machine is so busy that a robot's services run too late, and which
+//! programs keep it busy.
 //!
-//! The kernel tells for which share of the last ten seconds somebody waited for a core
-//! (`/proc/pressure/cpu`). Where it does not, the number of processes that want one is compared
-//! with the cores.
+//! The kernel says for which share of the last ten seconds some process waited for a core
+//! (`/proc/pressure/cpu`). If it does not say so, the number of processes that want a core is
+//! compared with the number of cores.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::time::Duration;
 
-/// The share of time, in percent, in which somebody waited, from which on it is too much.
+/// The machine is overloaded if processes waited for more than this share of the time, in percent.
 const WAITED: f64 = 60.0;
-/// Processes that want a core for each that there is, as the mean of a minute, from which on it is
-/// too much: with fewer, short waits are shared out.
+/// The machine is overloaded if more processes than this want each core, on average over a minute.
+/// With fewer, all wait a little.
 const WANT: f64 = 2.0;
-/// A clock tick of `/proc/PID/stat` on every Linux that people run.
+/// Clock ticks a second in `/proc/PID/stat`, on every usual Linux.
 const TICK: Duration = Duration::from_millis(10);
-/// How long processes are watched to find the greediest.
+/// How long to watch processes to find the busiest.
 const WATCHED: Duration = Duration::from_millis(200);
-/// The share of a core from which on a process is worth naming.
+/// Processes that take less than this share of a core are not named.
 const GREEDY: f64 = 0.1;
-/// How many are named.
+/// How many processes are named.
 const NAMED: usize = 3;
 
 /// How busy the machine is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
-    /// Processes that want a core, as the mean of a minute.
+    /// How many processes want a core, on average over a minute.
     wanting: f64,
     cores: usize,
-    /// The share of the last ten seconds in which somebody waited for a core, in percent.
+    /// The share of the last ten seconds in which some process waited for a core, in percent.
     waited: Option<f64>,
 }
 
 impl Load {
-    /// As it is now; `None` if the kernel does not tell.
+    /// The load now; `None` if the kernel does not say.
     pub fn now() -> Option<Self> {
         let pressure = fs::read_to_string("/proc/pressure/cpu").ok();
         let load = fs::read_to_string("/proc/loadavg").ok()?;
@@ -56,11 +56,11 @@ impl Load {
         })
     }
 
-    /// Whether services of a robot would wait for a core for too long.
+    /// Whether a robot's services would wait too long for a core.
     pub fn is_too_much(&self) -> bool {
         let want_too_many = self.wanting > WANT * self.cores as f64;
         match self.waited {
-            // Somebody always waits beside one who never rests, and that is no harm.
+            // Beside one process that never rests another always waits, and that is harmless.
             Some(waited) => waited > WAITED && self.wanting > self.cores as f64,
             None => want_too_many,
         }
@@ -76,17 +76,16 @@ impl Load {
     }
 }
 
-/// A sentence for whoever waits in vain: that the machine may be the cause.
+/// A sentence that says that the machine may be the cause, for a user who waits in vain.
 pub fn cause() -> Option<String> {
     let load = Load::now().filter(Load::is_too_much)?;
     Some(format!(
-        "this machine is overloaded: {}, so everything takes longer; `lager doctor` names the greediest",
+        "this machine is overloaded: {}, so everything takes longer; `lager doctor` names the busiest programs",
         load.said()
     ))
 }
 
-/// The processes that take most of the cores, with the share of one that each takes, the greediest
-/// first: those that are worth naming.
+/// The busiest processes, with the share of a core that each takes, the busiest first.
 pub fn greediest() -> Vec<String> {
     let before = times();
     std::thread::sleep(WATCHED);
@@ -109,7 +108,7 @@ pub fn greediest() -> Vec<String> {
     taken.into_iter().take(NAMED).map(said).collect()
 }
 
-/// What every process has run so far, in ticks, with its name.
+/// How long every process has run so far, in ticks, with its name.
 fn times() -> BTreeMap<u32, (String, u64)> {
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     processes
@@ -121,7 +120,7 @@ fn times() -> BTreeMap<u32, (String, u64)> {
         .collect()
 }
 
-/// A process's name and what it has run, from its `stat`.
+/// A process's name and how long it has run, from its `stat`.
 fn ticks(stat: &str) -> Option<(String, u64)> {
     // The name is in parentheses and may contain anything.
     let (before, rest) = stat.rsplit_once(") ")?;

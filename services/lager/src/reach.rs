@@ -1,11 +1,12 @@
-//! At which addresses others reach a socket that listens at all of them (`0.0.0.0`, `[::]`): those
-//! of this machine's interfaces, as the kernel lists them. Nobody can open `http://0.0.0.0`.
+//! Finds the addresses by which others reach a socket that listens at all of them (`0.0.0.0`,
+//! `[::]`): those of this machine's interfaces, as the kernel lists them. Nobody can open
+//! `http://0.0.0.0`.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// The addresses by which `at` is reached, from other computers first: itself, unless it stands for
-/// all of this machine's.
+/// The addresses at which others reach `at`, those for other computers first. It is only `at`
+/// itself, unless `at` means all addresses of this machine.
 pub fn reachable(at: SocketAddr) -> Vec<SocketAddr> {
     if !at.ip().is_unspecified() {
         return vec![at];
@@ -15,7 +16,7 @@ pub fn reachable(at: SocketAddr) -> Vec<SocketAddr> {
     if at.is_ipv6() {
         found.extend(global_v6(&read("/proc/net/if_inet6")));
     }
-    // Whatever the kernel lists, this machine itself reaches it so.
+    // Whatever the kernel lists, this machine reaches itself here.
     found.push(Ipv4Addr::LOCALHOST.into());
     let port = at.port();
     found
@@ -30,8 +31,8 @@ pub fn listed(at: SocketAddr, as_text: impl Fn(SocketAddr) -> String) -> String 
     all.join(" or ")
 }
 
-/// The addresses of this machine's interfaces but for loopback ones, from the kernel's table of
-/// routes: each stands in the line before one that ends in `host LOCAL`.
+/// The addresses of this machine's interfaces without the loopback ones, from the kernel's table of
+/// routes. Each stands in the line before a line that ends in `host LOCAL`.
 fn local_v4(trie: &str) -> Vec<IpAddr> {
     let mut found = Vec::new();
     let mut before = None;
@@ -55,8 +56,8 @@ fn local_v4(trie: &str) -> Vec<IpAddr> {
     found
 }
 
-/// The addresses of IPv6 that are good beyond the cable: 32 digits, and the scope `00` in the
-/// fourth column.
+/// The IPv6 addresses that other networks can reach: 32 digits, and the scope `00` in the fourth
+/// column.
 fn global_v6(table: &str) -> Vec<IpAddr> {
     let of = |line: &str| {
         let mut fields = line.split_ascii_whitespace();

@@ -1,13 +1,13 @@
-//! Real time for a service's process: priority, memory that stays, cores of its own. Without it,
-//! the services on the path ask for short time slices.
+//! Real time for a service's process: priority, memory that stays in RAM, cores of its own. If
+//! nobody asks for real time, the services on the path ask for short time slices.
 //!
-//! Everything is asked for before the process starts its first thread, so that every thread
-//! inherits it; then a thread of the path lets those go first that come after it
-//! ([`urgency::step_back`]). A process that asks for real time and does not get it ends with an
-//! error that says how to get it (exit code 5); it never runs slower than its user believes. The
-//! supervisor tries everything out before it starts any service, in a thread that ends at once
-//! ([`Wanted::rehearse`]); it never becomes real-time itself. Spinning with a real-time priority on
-//! as many cores as the machine has is refused, since it can hang the machine.
+//! A process asks for all of this before it starts its first thread, so every thread inherits it.
+//! Then each thread of the path lowers its own priority to its place ([`urgency::step_back`]). If
+//! the machine refuses, the process ends with an error that says how to get real time (exit code
+//! 5); it never runs slower than its user believes. The supervisor tries everything before it
+//! starts any service, in a thread that ends at once ([`Wanted::rehearse`]); it never becomes
+//! real-time itself. Services that spin at a real-time priority on all cores of the machine are
+//! refused, because they can hang the machine.
 
 mod cores;
 mod error;
@@ -17,7 +17,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use lager_ports::urgency;
+use lager_wake::urgency;
 use rustix::io::Errno;
 use rustix::process::Resource;
 
@@ -27,30 +27,30 @@ pub use error::RealtimeError;
 /// The highest priority of `SCHED_FIFO`.
 pub const HIGHEST_PRIORITY: u8 = 99;
 
-/// What one service may lock, in bytes. Measured are 39 MiB for the bridge and 43 for logic, 18 of
-/// them the program's file, and less than 1 MiB more with 64 observers; the rest is reserve for
-/// programs and topics that grow.
+/// How much memory one service may lock, in bytes. Measured are 39 MiB for the bridge and 43 for
+/// logic, 18 of them the program's file, and less than 1 MiB more with 64 observers. The rest is a
+/// reserve for programs and topics that grow.
 pub const LOCKED_AT_MOST: usize = 64 << 20;
 
-/// What one process wants of the machine.
+/// What one process asks of the machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
     /// Priority under `SCHED_FIFO`, 1 to 99; 0 is the normal scheduler.
     pub priority: u8,
-    /// Under the normal scheduler, get a core sooner than others. It needs no right, and the others
-    /// get no less time.
+    /// Under the normal scheduler, run sooner than others. This needs no right, and the others get
+    /// no less time.
     pub short_slices: bool,
-    /// Keep all memory of the process from being paged out.
+    /// Keep all memory of the process in RAM.
     pub lock_memory: bool,
     /// The cores to run on; empty leaves the choice to the kernel.
     pub cores: CoreSet,
 }
 
 impl Wanted {
-    /// Takes it for the calling thread and all threads that the process starts from now on.
+    /// Asks for it, for the calling thread and all threads that the process starts later.
     ///
     /// # Errors
-    /// The machine or the user's rights do not give it; the sentence says how to get it.
+    /// The machine or the user's rights do not allow it; the sentence says how to get it.
     pub fn apply(&self) -> Result<(), RealtimeError> {
         self.take_cores()?;
         self.try_memory()?;
@@ -61,10 +61,10 @@ impl Wanted {
         self.take_priority()
     }
 
-    /// Finds out whether [`Self::apply`] would succeed, truly and without keeping anything.
+    /// Tries whether [`Self::apply`] would succeed, and gives everything back.
     ///
     /// # Errors
-    /// Those of [`Self::apply`].
+    /// As [`Self::apply`].
     pub fn rehearse(&self) -> Result<(), RealtimeError> {
         in_passing(|| {
             self.take_cores()?;
@@ -90,7 +90,7 @@ impl Wanted {
                 Some(core) => Err(refused(core)),
                 None => Ok(()),
             },
-            // None of them is allowed.
+            // The kernel allows none of them.
             Err(error) if is(&error, Errno::INVAL) => {
                 Err(refused(self.cores.iter().next().unwrap_or(0)))
             }
@@ -104,7 +104,7 @@ impl Wanted {
         }
         let allowed = kernel::whole_limit(Resource::Memlock);
         kernel::try_lock(LOCKED_AT_MOST).map_err(|error| {
-            // Which of the three depends on whether the limit is zero, small, or nearly used up.
+            // Which error it is depends on the limit: zero, too small, or nearly used up.
             let limited = [Errno::PERM, Errno::NOMEM, Errno::AGAIN]
                 .iter()
                 .any(|errno| is(&error, *errno));
@@ -116,7 +116,7 @@ impl Wanted {
     }
 
     fn take_slices(&self) {
-        // A sandbox may forbid the call; the path is then as it is with longer slices.
+        // A sandbox may forbid the call. The path then works with longer time slices.
         if self.short_slices
             && self.priority == 0
             && let Err(error) = urgency::shorten_slices()
@@ -145,13 +145,13 @@ impl Wanted {
     }
 }
 
-/// Refuses services that never sleep, at a priority above everything else, on so many cores that
-/// nothing else would run: neither the rest of the robot nor the shell that could end it.
+/// Refuses services that never sleep at a real-time priority on too many cores: no core would be
+/// left for the rest of the robot, or for the shell that could end it.
 ///
-/// `spinners` has the cores each of them wants, where empty stands for all of `allowed`.
+/// `spinners` has the cores that each of them wants; empty means all of `allowed`.
 ///
 /// # Errors
-/// No core would be left, or they would keep each other from running.
+/// No core would be left, or the services would keep each other from running.
 pub fn refuse_starvation(spinners: &[CoreSet], allowed: &CoreSet) -> Result<(), RealtimeError> {
     if spinners.len() >= allowed.len() && !spinners.is_empty() {
         return Err(RealtimeError::NoCoreLeft {
@@ -159,7 +159,7 @@ pub fn refuse_starvation(spinners: &[CoreSet], allowed: &CoreSet) -> Result<(), 
             cores: allowed.len(),
         });
     }
-    // Each needs a core of its own, so no few of them may share fewer cores than they are.
+    // Each needs a core of its own, so no group of them may have fewer cores than members.
     for few in 1_usize..1 << spinners.len() {
         let chosen = || (0..spinners.len()).filter(|spinner| few >> spinner & 1 == 1);
         if chosen().any(|spinner| spinners[spinner].is_empty()) {
@@ -175,11 +175,11 @@ pub fn refuse_starvation(spinners: &[CoreSet], allowed: &CoreSet) -> Result<(), 
     Ok(())
 }
 
-/// The cores that this process may choose from: those of the machine less what its control group
-/// withholds, whatever it is bound to at the moment.
+/// The cores that this process may choose: the machine's cores without those that its control group
+/// forbids, whatever cores it is bound to now.
 ///
 /// # Errors
-/// The kernel does not say.
+/// The kernel does not say it.
 pub fn allowed_cores() -> Result<CoreSet, RealtimeError> {
     in_passing(|| {
         kernel::pin(&(0..rustix::thread::CpuSet::MAX_CPU).collect())
@@ -191,14 +191,14 @@ pub fn allowed_cores() -> Result<CoreSet, RealtimeError> {
 /// The cores of the machine that are switched on.
 pub fn existing_cores() -> CoreSet {
     let online = fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
-    // Without the file the kernel's own word on what is allowed has to do.
+    // Without the file, take the cores that the kernel allows.
     online
         .parse()
         .unwrap_or_else(|_| allowed_cores().unwrap_or_default())
 }
 
-/// Of each period of the kernel's, the time that real-time threads may take, both in µs. A
-/// negative time is no limit.
+/// The time that real-time threads may take of each period, and the period, both in µs. A negative
+/// time means no limit.
 pub fn throttle() -> Option<(i64, i64)> {
     let read = |name: &str| {
         let text = fs::read_to_string(Path::new("/proc/sys/kernel").join(name)).ok()?;
@@ -207,7 +207,7 @@ pub fn throttle() -> Option<(i64, i64)> {
     Some((read("sched_rt_runtime_us")?, read("sched_rt_period_us")?))
 }
 
-/// Runs `work` in a thread that ends with it and takes its priority and cores along.
+/// Runs `work` in a thread of its own, so that its priority and cores end with that thread.
 fn in_passing<T: Send>(
     work: impl FnOnce() -> Result<T, RealtimeError> + Send,
 ) -> Result<T, RealtimeError> {

@@ -2,40 +2,43 @@
 //!
 //! It joins the same state machines as the real processes by function calls: no bus, no clock, no
 //! thread. The bridge is the real one except for its ports: its core, and the receiving end of each
-//! port. A run is a function of warehouse, mission and seed. It proves that the shells decide
-//! nothing, and it is the fast way to try a warehouse or a change.
+//! port. Logic's shell is not there; [`Outgoing`] says here as there in which order logic's answers
+//! go out, and when its order goes out again. A run depends only on warehouse, mission and seed.
+//! It is the fast way to try a warehouse or a change.
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use lager_bridge::listener::{Heard, Listener};
-use lager_bridge::machine::{Action, BridgeCore, CoreOptions};
-use lager_bridge::{Counts, Moment, PortEvent};
-use lager_logic::{Input, LogicConfig, Navigator};
+use lager_bridge::machine::{BridgeCore, CoreOptions, Effect};
+use lager_bridge::{Counts, PortEvent};
+use lager_logic::{Input, KnownHealth, LogicConfig, Navigator, Outgoing, Part};
+use lager_operator::Act;
+use lager_orders::{Moment, Pick};
 use lager_plant::{GoodState, Warehouse};
-use lager_ports::Stop;
+use lager_sample::Tag;
 use lager_simulator::{CalibrateError, Robot, RobotOptions, Wire};
+use lager_stop::Stop;
+use lager_supervisor::console;
+use lager_supervisor::mission::{Helper, Mission, Seen, Watch};
 use lager_topics::{
-    Ask, EventKind, FailureKind, Health, Hold, Pick, Role, SteeringOrder, SteeringReport, Tag,
+    Ask, Event, EventKind, FailureKind, Health, Hold, Role, SteeringOrder, SteeringReport,
+    WarehouseMap,
 };
 use serde::Serialize;
 
 use crate::cli::SimulateArgs;
-use crate::config::{self, Config, PickBy};
+use crate::config::{self, Config};
 use crate::exit;
-use crate::map::bus_map;
-use crate::mission::{Act, Helper, Mission, Seen, Watch};
 use crate::up::mission;
 
 /// How far time moves at each turn of the loop.
 const TICK: Duration = Duration::from_millis(1);
-/// How often logic's order is renewed, as its shell does.
-const RENEW: Duration = Duration::from_millis(40);
-/// How often the mission is looked at.
+/// How often the mission is checked.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// One run's line.
+/// The result of one run.
 #[derive(Debug, Serialize)]
 struct Line<'a> {
     warehouse: &'a str,
@@ -43,7 +46,7 @@ struct Line<'a> {
     delivered: Vec<i32>,
     sim_seconds: f64,
     wall_seconds: f64,
-    /// How many times as fast as real time it ran.
+    /// Its speed; 1 is real time.
     times_real: f64,
     /// Packets from both boards.
     frames: u64,
@@ -51,7 +54,7 @@ struct Line<'a> {
     lost: u64,
     /// How often the robot has found a way blocked.
     blocked: u32,
-    /// How often the body has run into something.
+    /// How often the body has hit something.
     collisions: u32,
     /// How often goods have slipped out of the claw.
     slips: u32,
@@ -61,17 +64,17 @@ struct Line<'a> {
     battery_volts: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     failure: Option<String>,
-    /// What logic calls it that it stands.
+    /// The reason why logic stands.
     #[serde(skip_serializing_if = "Option::is_none")]
     failure_kind: Option<Tag<FailureKind>>,
-    /// What keeps a robot that would go on by itself.
+    /// The reason why a robot waits that will go on by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     hold: Option<Tag<Hold>>,
 }
 
-/// Runs every seed in every warehouse; fails when a mission is not delivered.
+/// Runs every seed in every warehouse; fails if a mission was not delivered.
 pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
-    if config.logic.pick == Some(PickBy::Manual) {
+    if config.logic.pick == Some(Pick::Manual) {
         bail!(exit::Usage(
             "[logic] pick is \"manual\", and in virtual time nobody is there who would move the arm; \
              leave the key out"
@@ -134,13 +137,13 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
 
 fn tell(line: &Line<'_>, as_json: bool) -> Result<()> {
     if as_json {
-        return crate::say(&serde_json::to_string(line)?);
+        return console::print(&serde_json::to_string(line)?);
     }
     let end = match &line.failure {
         Some(why) => format!("FAILED: {why}"),
         None => format!("delivered {:?}", line.delivered),
     };
-    crate::say(&format!(
+    console::print(&format!(
         "{:8} seed {:3}: {end} in {:.1} s, {:.0} times as fast as real, {} frames, {} lost, \
          {} collisions, at most {:.0} mm off the line",
         line.warehouse,
@@ -154,7 +157,7 @@ fn tell(line: &Line<'_>, as_json: bool) -> Result<()> {
     ))
 }
 
-/// The ends of the cables on the Pi, in the order of the ports.
+/// The Pi's ends of the cables, in the order of the ports.
 const WIRES: [Wire; 2] = [Wire::Sensor, Wire::Steering];
 
 /// Robot, bridge, logic and the mission.
@@ -168,18 +171,19 @@ struct Whole {
     stop: Option<Stop>,
     /// Orders on their way to the bridge.
     orders: Vec<SteeringOrder>,
-    /// Something has come to the bridge since it last decided.
+    /// Whether the bridge has received something since it last decided.
     stirred: bool,
     navigator: Navigator,
     watch: Watch,
+    known_health: KnownHealth,
+    outgoing: Outgoing,
     seen: Seen,
-    renewed: Duration,
     looked: Duration,
     frames: u64,
     /// How often logic has found a way blocked.
     blocked: u32,
     bytes: Vec<u8>,
-    /// What the wires carry, for the tests of repetition.
+    /// The bytes on the wires, for the tests that repeat a run.
     #[cfg(test)]
     tape: taped::Tape,
 }
@@ -204,7 +208,8 @@ impl Whole {
             original_boards: config.serial.original_boards,
             arm: config.arm,
         };
-        let map = bus_map(warehouse);
+        let (side, grid, products) = warehouse.told()?;
+        let map = WarehouseMap::new(side, grid, &products);
         let mut whole = Self {
             now: Duration::ZERO,
             robot: Robot::new(warehouse, options)?,
@@ -219,8 +224,9 @@ impl Whole {
                 ..config.navigator()
             }),
             watch: Watch::new(Mission::of_robot(mission, 1), Helper::Nobody),
+            known_health: KnownHealth::default(),
+            outgoing: Outgoing::default(),
             seen: Seen::default(),
-            renewed: Duration::ZERO,
             looked: Duration::ZERO,
             frames: 0,
             blocked: 0,
@@ -232,7 +238,7 @@ impl Whole {
         Ok(whole)
     }
 
-    /// Has a person calibrate the line sensors before anything else happens.
+    /// Calibrates the line sensors first, as a person does.
     fn calibrate(&mut self) -> Result<(), CalibrateError> {
         lager_simulator::calibrate(&mut self.robot)?;
         self.now = self.robot.now();
@@ -257,8 +263,10 @@ impl Whole {
             self.receive(place);
         }
         self.tell_logic(Input::Tick);
-        if self.now - self.renewed >= RENEW {
-            self.renew();
+        for part in self.outgoing.again(self.now, Duration::ZERO) {
+            if part == Part::Order {
+                self.give_order();
+            }
         }
         if self.now - self.looked >= LOOK {
             self.looked = self.now;
@@ -271,19 +279,19 @@ impl Whole {
         }
     }
 
-    /// What keeps it although it would go on by itself.
+    /// The reason why it waits although it will go on by itself.
     fn hold(&self) -> Option<Tag<Hold>> {
         let hold = self.navigator.status().hold;
         (hold != Hold::None).then_some(hold)
     }
 
-    /// What logic calls it that it stands.
+    /// The reason why logic stands.
     fn failure_kind(&self) -> Option<Tag<FailureKind>> {
         let failure = self.navigator.status().failure;
         (!failure.is_none()).then_some(failure.kind)
     }
 
-    /// What the mission says is delivered must lie at the delivery station.
+    /// Checks that delivered products really lie at the delivery station.
     fn not_at_the_bar(&self) -> Option<String> {
         let goods = self.robot.truth().world.goods;
         let lies_there = |product: i32| {
@@ -299,7 +307,7 @@ impl Whole {
             .map(|product| format!("product {product} does not lie at the delivery station"))
     }
 
-    /// Takes what has arrived at one port.
+    /// Takes the bytes that have arrived at one port.
     fn receive(&mut self, place: usize) {
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.clear();
@@ -335,11 +343,10 @@ impl Whole {
                 self.tape.measured(frame.distance_cm);
                 self.tell_logic(Input::Distance(frame.distance_cm));
             }
-            Heard::Data(event) => {
-                self.frames += 1;
+            Heard::Event(event) => {
+                self.frames += u64::from(event.is_repeated());
                 self.tell_bridge(place, event);
             }
-            Heard::Link(event) => self.tell_bridge(place, event),
         }
     }
 
@@ -349,7 +356,7 @@ impl Whole {
         self.act();
     }
 
-    /// Lets the bridge decide when it has to, as it does when it is woken.
+    /// Lets the bridge decide at the moments when it would wake up.
     fn run_bridge(&mut self) {
         self.stirred |= self.bridge.next_due() <= self.now;
         while std::mem::take(&mut self.stirred) {
@@ -359,7 +366,7 @@ impl Whole {
             }
             self.bridge.decide(self.now);
             self.act();
-            // The asker sees by `link/health` what became of it.
+            // The sender of the request sees the answer in `link/health`.
             let _ = self.bridge.answer();
         }
     }
@@ -368,26 +375,26 @@ impl Whole {
     fn act(&mut self) {
         while let Some(action) = self.bridge.next(self.moment()) {
             match action {
-                Action::Write(write) => {
+                Effect::Write(write) => {
                     #[cfg(test)]
                     self.tape.wrote(self.now, write.place, &write.packet);
                     self.robot.write(WIRES[write.place], &write.packet);
                     self.bridge.wrote(&write, true, self.moment());
                 }
-                Action::PublishHealth { .. } => self.publish_health(),
-                Action::PublishState { .. } => self.publish_state(),
-                Action::Stop(cause) => {
+                Effect::PublishHealth { .. } => self.publish_health(),
+                Effect::PublishState { .. } => self.publish_state(),
+                Effect::Stop(cause) => {
                     let stop = Stop::new(Role::Bridge, cause, self.moment().ns);
                     self.stop.get_or_insert(stop);
                     self.bridge.stop(stop);
                 }
-                Action::Release(_) => {
+                Effect::Release(_) => {
                     self.stop = None;
                     self.bridge.released(true);
                 }
-                // What was written is on the wire, and no process waits for a stop.
-                Action::Discard { .. } | Action::ShowReport(_) => {}
-                Action::Say(news) => tracing::debug!(at = ?self.now, ?news),
+                // The bytes are on the wire at once, and no process waits for a stop.
+                Effect::Discard { .. } | Effect::ShowReport(_) => {}
+                Effect::Say(news) => tracing::debug!(at = ?self.now, ?news),
             }
         }
     }
@@ -396,17 +403,9 @@ impl Whole {
         let mut health = Health::default();
         self.bridge.fill_health(self.now, &self.counts, &mut health);
         self.bridge.health_told();
-        // Logic is told what is new to it, as its shell does.
-        let told = self.seen.health.replace(health);
-        if told.map(|told| told.driven_by_hand) != Some(health.driven_by_hand) {
-            self.tell_logic(Input::DrivenByHand(health.driven_by_hand));
-        }
-        let steers = |health: Health| (health.mode, health.stopped);
-        if let Some(mode) = health.mode.get()
-            && told.map(steers) != Some(steers(health))
-        {
-            let stopped = health.stopped != 0;
-            self.tell_logic(Input::Mode { mode, stopped });
+        self.seen.health = Some(health);
+        for input in self.known_health.news(&health) {
+            self.tell_logic(input);
         }
     }
 
@@ -417,7 +416,7 @@ impl Whole {
         self.tell_logic(Input::Steering(&report));
     }
 
-    /// A request to the bridge; its answer is seen by what it does.
+    /// A request to the bridge. Its effect is the answer.
     fn ask(&mut self, ask: &Ask) {
         let ask = Ask {
             issued_ns: self.moment().ns,
@@ -436,47 +435,52 @@ impl Whole {
         }
     }
 
-    /// One input for logic; a changed order is given at once.
+    /// One input for logic. Its events, order and thought go out; nobody here waits for the rest.
     fn tell_logic(&mut self, input: Input<'_>) {
-        let before = self.navigator.current_order();
         let said = self.navigator.handle(self.now, input);
-        for event in &said.events {
-            match event.kind.get() {
-                Some(EventKind::Refused) => {
-                    self.seen.refused = Some((event.order_id, event.product, event.failure));
+        let order = self.navigator.current_order();
+        for part in self.outgoing.after(self.now, order, &said) {
+            match part {
+                Part::Events => said.events.iter().for_each(|event| self.hear(event)),
+                Part::Order => self.give_order(),
+                Part::Thought => {
+                    if let Some(thought) = &said.thought {
+                        tracing::info!(at = ?self.now, "{thought}");
+                    }
                 }
-                Some(EventKind::WayBlocked) => self.blocked += 1,
-                _ => {}
+                Part::Blocks | Part::Queue | Part::Status | Part::Route => {}
             }
         }
-        if let Some(thought) = &said.thought {
-            tracing::info!(at = ?self.now, "{thought}");
-        }
-        if self.navigator.current_order() != before {
-            self.renew();
+    }
+
+    fn hear(&mut self, event: &Event) {
+        match event.kind.get() {
+            Some(EventKind::Refused) => {
+                self.seen.refused = Some((event.order_id, event.product, event.failure));
+            }
+            Some(EventKind::WayBlocked) => self.blocked += 1,
+            _ => {}
         }
     }
 
-    fn renew(&mut self) {
-        self.renewed = self.now;
-        if let Some(order) = self.navigator.current_order() {
-            self.give(order);
-        }
-    }
-
-    fn give(&mut self, order: SteeringOrder) {
-        self.orders.push(order);
+    fn give_order(&mut self) {
+        self.orders.extend(self.outgoing.order());
         self.stirred = true;
     }
 
-    /// What a person would see, and what is done for the mission.
+    /// Takes what a person would see, and acts for the mission.
     fn see_to_mission(&mut self) {
         self.seen.status = Some(self.navigator.status());
         self.seen.queue = Some(self.navigator.queue());
-        match self.watch.step(self.now, &self.seen) {
-            Some(Act::Ask(ask)) => self.ask(&ask),
+        let Moment { robot, ns } = self.moment();
+        match self
+            .watch
+            .step(lager_orders::Moment { robot, ns }, &self.seen)
+        {
+            Some(Act::Ask { ask, .. }) => self.ask(&ask),
             Some(Act::Order(order)) => self.tell_logic(Input::Order(&order)),
-            None => {}
+            // A mission presses nothing and asks no world.
+            Some(Act::Press(_) | Act::AskWorld { .. }) | None => {}
         }
     }
 

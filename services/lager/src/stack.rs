@@ -1,20 +1,20 @@
-//! The stack of the main thread. Where `ulimit -s` leaves too little, the kernel ends the process in
-//! the middle of something without a sentence. The kernel looks at the limit whenever the stack
-//! grows, so it is raised here, before anything needs it, and child processes inherit that. All other
+//! The stack of the main thread. If `ulimit -s` is too small, the kernel kills the process
+//! somewhere in its work, without a sentence. The kernel checks the limit whenever the stack grows,
+//! so this file raises it before the program needs it. Child processes inherit the limit. All other
 //! threads have 2 MiB of their own, whatever the limit is.
 
 use anyhow::{Result, bail};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-/// What the main thread of any command needs, with some to spare, in bytes.
+/// What the main thread of any command needs, with a reserve, in bytes.
 const NEEDED: u64 = 1 << 20;
-/// What it gets where it may, as on every other Linux machine, in bytes.
+/// What it gets if the limit allows, as on every other Linux machine, in bytes.
 const USUAL: u64 = 8 << 20;
 
-/// Makes sure that the stack suffices.
+/// Makes sure that the stack is large enough.
 ///
 /// # Errors
-/// It does not, and this user may not raise its limit.
+/// It is too small, and this user may not raise its limit.
 pub fn must_suffice() -> Result<()> {
     let Some(raised) = raised(&getrlimit(Resource::Stack)) else {
         return Ok(());
@@ -30,7 +30,7 @@ pub fn must_suffice() -> Result<()> {
     Ok(())
 }
 
-/// The limit that is needed instead, if this one is too low. Above the upper limit only root goes.
+/// The new limit, if this one is too low. Only root may raise it above the upper limit.
 fn raised(limit: &Rlimit) -> Option<Rlimit> {
     limit.current.filter(|current| *current < NEEDED)?;
     let maximum = limit.maximum.map(|maximum| maximum.max(NEEDED));

@@ -1,7 +1,8 @@
-//! `lager station`: the external computer in this process, until it is told to end.
+//! `lager station`: runs the external computer in this process, until somebody ends it.
 //!
-//! Alone it listens where it is told. As a child of `lager up` its standard output is the socket at
-//! which robots connect. Where it keeps the warehouse and what waits, `state.rs` says.
+//! Started alone it listens where its user says. Started by `lager up`, its standard output is the
+//! socket for robots. `state_folder.rs` of the supervisor says where it keeps the warehouse and the
+//! orders.
 
 use std::net::{SocketAddr, TcpListener};
 use std::os::fd::AsFd;
@@ -9,44 +10,41 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use lager_comm::secrets_at;
+use lager_home::LONGEST_SOCKET;
 use lager_lines::Name;
 use lager_lines::secret::Secrets;
 use lager_panel::{Panel, Tokens};
-use lager_ports::Shutdown;
+use lager_plant::Warehouse;
 use lager_station::files::Hold;
-use lager_station::{Listen, Queues, Server, ServerConfig, Warehouse};
+use lager_station::{Listen, Queues, Server, ServerConfig};
+use lager_supervisor::Service;
+use lager_supervisor::children::adopt;
+use lager_supervisor::console;
+use lager_supervisor::runtime_folder::{GAG, RuntimeFolder};
+use lager_supervisor::state_folder::StateFolder;
+use lager_wake::Shutdown;
 
 use crate::cli::StationArgs;
 use crate::config::{Config, StationSection};
 use crate::goods;
 use crate::reach;
-use crate::runtime::RuntimeFolder;
-use crate::services::Service;
-use crate::state::StateFolder;
-use crate::supervisor;
 
-/// What a station calls itself towards robots.
+/// The station's name towards robots.
 const NAME: &str = "station";
-
-/// Where a GaG connects unless somebody says otherwise, in the folder of the bus.
-const GAG: &str = "gag";
-
-/// The longest path of a socket, in bytes.
-const LONGEST_SOCKET: usize = 107;
 
 /// Runs it.
 ///
 /// # Errors
-/// An address, a socket or the warehouse cannot be had; the sentence says what to do.
+/// An address, a socket or the warehouse is not available; the sentence says what to do.
 pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<()> {
     let (server, panel) = match args.parent {
         Some(parent) => {
-            supervisor::adopt(parent, shutdown)?;
+            adopt(parent, shutdown)?;
             let mut server = Server::open(supervised(config)?)?;
-            let life = RuntimeFolder::live_as(config, Service::Station)?;
+            let life = RuntimeFolder::live_as(&config.bus()?, Service::Station)?;
             server.each_turn(move || life.goes_on());
             let panel = config.station.panel.and_then(|address| {
-                // Robots are served, whoever looks.
+                // The station serves robots, whoever looks at the panel.
                 let panel = tokens(config).and_then(|tokens| {
                     let panel = Panel::open(address, tokens, server.handle());
                     Ok(panel?)
@@ -72,7 +70,7 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
     Ok(())
 }
 
-/// As somebody has started it.
+/// Started by a person.
 fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)> {
     let gag = match &args.gag {
         Some(path) => path.clone(),
@@ -100,14 +98,14 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
         otherwise,
         fetch: orders.collect(),
     })?;
-    crate::say(&format!(
+    console::print(&format!(
         "robots connect to {}, a GaG to {}; {told}; {}",
         reach::listed(server.address()?, |at| at.to_string()),
         gag.display(),
         match args.robots_secret {
             Some(_) => "robots prove who they are",
             None =>
-                "whoever connects is believed to be the robot that he says he is; with --robots-secret FILE robots prove it",
+                "the station believes every robot's name; with --robots-secret FILE robots prove their names",
         },
     ))?;
     let panel = match args.no_panel {
@@ -117,7 +115,7 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
     Ok((server, panel))
 }
 
-/// The panel of a station that runs by itself, and where it is.
+/// The panel of a station that runs by itself, and its addresses.
 fn panel(address: Option<SocketAddr>, server: &Server) -> Result<Panel> {
     let address = match address {
         Some(address) => address,
@@ -126,7 +124,7 @@ fn panel(address: Option<SocketAddr>, server: &Server) -> Result<Panel> {
     let tokens = Tokens::random()?;
     let panel = Panel::open(address, tokens.clone(), server.handle())?;
     let at = panel.address()?;
-    crate::say(&format!(
+    console::print(&format!(
         "the panel is at {} for who drives, and at {} for who looks and stops",
         page_at(at, &tokens.driver),
         page_at(at, &tokens.viewer)
@@ -134,13 +132,13 @@ fn panel(address: Option<SocketAddr>, server: &Server) -> Result<Panel> {
     Ok(panel)
 }
 
-/// By what people get into the panel of the robot's own station. It follows from the secret in the
-/// robot's folder, so it stays the same for as long as `up` runs, whatever becomes of the station.
+/// The tokens of the panel of the robot's own station. They come from the secret in the robot's
+/// folder, so they stay the same while `up` runs, even if the station is replaced.
 ///
 /// # Errors
 /// There is no such secret.
 pub fn tokens(config: &Config) -> Result<Tokens> {
-    let secrets = secrets_at(&RuntimeFolder::secret(config)?)?;
+    let secrets = secrets_at(&RuntimeFolder::secret(&config.bus()?)?)?;
     Ok(Tokens::of(
         secrets
             .of_all()
@@ -148,26 +146,26 @@ pub fn tokens(config: &Config) -> Result<Tokens> {
     ))
 }
 
-/// Where a page is opened that the `token` lets in.
+/// The address of a page that lets in whoever has `token`.
 pub fn page_at(address: SocketAddr, token: &str) -> String {
     reach::listed(address, |at| format!("http://{at}/?token={token}"))
 }
 
-/// Where a panel answers on this machine if nobody says: the usual address, or a port that is free.
+/// Where a panel answers on this machine by default: at the usual address, or at a free port.
 ///
 /// # Errors
 /// There is no port.
 pub fn usual_panel() -> Result<SocketAddr> {
-    // It is opened again in a moment: a panel whose port is lost in between is told.
+    // The panel opens it again in a moment, and reports it if the port is lost in between.
     let socket = TcpListener::bind(StationSection::USUAL_PANEL)
         .or_else(|_| TcpListener::bind("127.0.0.1:0"))?;
     Ok(socket.local_addr()?)
 }
 
-/// What an earlier station of the robot's own had not told it to fetch yet.
+/// The orders that an earlier station of this robot had not given it yet.
 ///
 /// # Errors
-/// The file is there and is not read.
+/// The file exists and cannot be read.
 pub fn waits(config: &Config) -> Result<Vec<i32>> {
     let Some(queue) = &config.station.queue else {
         return Ok(Vec::new());
@@ -176,15 +174,15 @@ pub fn waits(config: &Config) -> Result<Vec<i32>> {
     Ok(queues.0.remove(&config.name).unwrap_or_default())
 }
 
-/// Writes what the station that `lager up` starts begins with: what the robot is to fetch, besides
-/// what other robots of the same station wait for.
+/// Writes the queues with which the station of `lager up` begins: the orders of this robot, and
+/// those of other robots of the same station.
 ///
 /// # Errors
-/// The disk does not take it, or another station keeps the same warehouse.
+/// The disk refuses the file, or another station keeps the same warehouse.
 pub fn prepare(config: &Config, products: &[i32]) -> Result<()> {
     let section = &config.station;
     if let Some(warehouse) = &section.warehouse {
-        // The station takes it for good; here somebody can still be told.
+        // The station takes the lock for good; here the user still sees the error.
         Hold::of(warehouse)?;
     }
     let Some(queue) = &section.queue else {
@@ -200,12 +198,13 @@ pub fn prepare(config: &Config, products: &[i32]) -> Result<()> {
     Ok(())
 }
 
-/// As `lager up` has started it: with what was prepared, or what the one before it has saved.
+/// Started by `lager up`: begins with the prepared queues, or with those that the station before
+/// saved.
 fn supervised(config: &Config) -> Result<ServerConfig> {
     let robots = std::io::stdout().as_fd().try_clone_to_owned()?;
     let gag = match &config.station.gag {
         Some(gag) => gag.clone(),
-        None => RuntimeFolder::gag(config)?,
+        None => RuntimeFolder::gag(&config.bus()?)?,
     };
     let fits = fits(&gag);
     if let Err(why) = &fits {
@@ -226,23 +225,22 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
     })
 }
 
-/// The warehouse of a station that runs by itself: its file, and what it is as long as there is
-/// none.
+/// The warehouse of a station that runs by itself: its file, and the warehouse to use while there
+/// is no file.
 fn own_warehouse(config: &Config, named: Option<&str>) -> Result<(PathBuf, Option<Warehouse>)> {
     let Some(name) = named else {
-        let folder = StateFolder::of_station(config)?;
+        let folder = StateFolder::of_station(&config.state_root()?)?;
         return Ok((folder.warehouse_of_nobody(), None));
     };
-    let builtin = lager_plant::Warehouse::builtin(name);
+    let builtin = Warehouse::builtin(name);
     let path = match builtin {
-        Some(_) => StateFolder::of_station(config)?.warehouse(name)?,
+        Some(_) => StateFolder::of_station(&config.state_root()?)?.warehouse(name),
         None => PathBuf::from(name),
     };
-    let builtin = builtin.as_ref().map(goods::described_by).transpose()?;
     Ok((path, builtin))
 }
 
-/// Refuses a path that no socket can have.
+/// Refuses a path that is too long for a socket.
 ///
 /// # Errors
 /// It is too long.
@@ -261,15 +259,15 @@ fn name() -> Result<Name> {
     Name::new(NAME).context("the station's name")
 }
 
-/// Where a GaG connects to a station that nobody has told another place.
+/// Where a GaG connects to a station by default.
 ///
 /// # Errors
-/// The place of the bus cannot be had.
+/// The folder of the bus cannot be found.
 pub fn default_gag(config: &Config) -> Result<PathBuf> {
-    Ok(config.bus()?.place()?.folder().join(GAG))
+    Ok(config.bus()?.home()?.folder().join(GAG))
 }
 
-/// What is known of the warehouse, as the end of a sentence.
+/// What the station knows of the warehouse, as the end of a sentence.
 fn warehouse(path: &Path, named: Option<&str>, is_built_in: bool) -> String {
     let at = path.display();
     match (path.exists(), named.filter(|_| is_built_in)) {

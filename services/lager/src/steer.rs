@@ -1,45 +1,47 @@
-//! The one-shot commands: `drive`, `arm`, `resume`, `mode`, `picked`, `reset`, `gains` and
-//! `calibrate`. The commands about orders and those that act like hands have their own files.
-//! `stop` is apart, because it must work without the bus.
+//! The commands that order something of a robot that is up. `steer/ordered.rs` knows each of them,
+//! and this file gives its order. `stop` is apart, because it must work without the bus.
 //!
-//! Each opens the bus as an operator, does one thing through the same [`Hands`] as `up`, waits
-//! until the robot shows the effect, and says what came of it.
+//! Each opens the bus as an operator and gives one order, with the same state machine as comm
+//! (`lager-operator`). It waits until the robot shows the effect, and prints the result.
 
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, anyhow, bail};
-use lager_bridge::arbiter::{LEASE, REPORT_DEADLINE};
-use lager_lines::LATEST_MOVE;
-use lager_ports::{Bus, BusConfig, Clock, Stop, Subscriber};
+use anyhow::{Result, bail};
+use lager_home::Clock;
+use lager_operator::{Act, Begun, Driving, For, Ids, Orders, Seen};
+use lager_orders::lease::LATEST_MOVE;
+use lager_orders::{Action, Mode, Moment, Reason};
+use lager_ports::{Bus, BusConfig, Subscriber};
+use lager_sample::Topic;
+use lager_stop::Stop;
+use lager_supervisor::console;
+use lager_supervisor::hands::Hands;
+use lager_supervisor::stopped::describe;
 use lager_topics::{
-    Answer, Ask, AskKind, EventKind, Finish, Health, Input, InputKind, LinkHealth, MissionEvent,
-    Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Pick, Refusal, Role, SteeringOrder,
-    SteeringState, StopCause, Topic,
+    Health, LinkHealth, MissionEvent, MissionQueue, NavStatus, Refusal, Role, SteeringState,
+    StopCause, WorldRequest,
 };
-use lager_wire::{OperatorCommand, Version};
+use lager_wire::OperatorCommand;
 
 use crate::config::Config;
-use crate::hands::Hands;
-use crate::patience::Patience;
-use crate::runtime::RuntimeFolder;
+use crate::hint::hinted;
 use crate::stop;
+use crate::time_limit::TimeLimit;
 
 mod map;
+mod ordered;
 mod queue;
 mod world;
 
-pub use world::{Obstacle, Place};
+/// How often the robot's answer is checked, in real time.
+const GLANCE: Duration = Duration::from_millis(20);
 
-/// How often an order is renewed, in robot time; its lease is three times as long.
-const RENEW: Duration = Duration::from_millis(40);
-/// How long a calibration may take in robot time; the board watches its sensors for five seconds.
-const CALIBRATION: Duration = Duration::from_secs(8);
 /// An operator at work on a robot that is up.
 pub struct Operator {
-    patience: Patience,
+    patience: TimeLimit,
     bus: Bus,
     hands: Hands,
-    /// What the robot was started with.
+    /// The configuration with which the robot was started.
     running: Config,
     health: Subscriber<LinkHealth>,
 }
@@ -49,16 +51,16 @@ impl Operator {
     ///
     /// # Errors
     /// When no bridge of this robot answers.
-    pub fn new(config: &Config, patience: Patience) -> Result<Self> {
-        // The robot's clock may be another than this command's configuration says.
-        let running = RuntimeFolder::running(config)?.unwrap_or_else(|| config.clone());
+    pub fn new(config: &Config, patience: TimeLimit) -> Result<Self> {
+        // The robot's clock may differ from the one in this command's configuration.
+        let running = config.of_running_robot()?.unwrap_or_else(|| config.clone());
         let BusConfig { speed, clock, .. } = running.bus()?;
         let bus = BusConfig {
             speed,
             clock,
             ..config.bus()?
         };
-        // Until the robot has taken a command that lasts, all of it is one call.
+        // Until the robot has taken a command that lasts, one time limit holds for everything.
         patience.watchdog.enter("the command");
         let bus = Bus::open(&bus, Role::Operator)?;
         let operator = Self {
@@ -71,217 +73,119 @@ impl Operator {
         Ok(operator)
     }
 
-    /// Ctrl-C; then the robot stands, because its order is no longer renewed.
+    /// `lager drive`: ends with the command, after its seconds, or at Ctrl-C. The robot then stands,
+    /// because nobody renews its order.
     pub fn drive(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
         let health = self.health()?;
         if health.mode.get() != Some(Mode::Manual) {
             bail!("the robot is autonomous; `lager mode manual` lets you drive");
         }
-        self.carry_out(command, seconds)
+        self.steer(command, seconds)
     }
 
-    /// `lager arm`: one step of the arm.
-    pub fn arm(&mut self, command: OperatorCommand) -> Result<String> {
-        self.carry_out(command, None)
-    }
-
-    /// `lager resume`: releases the stop that was set when its command was given, tells which that
-    /// is, and what truly happened.
-    pub fn resume(&self, config: &Config, before: Option<Stop>) -> Result<String> {
+    /// `lager resume`: releases the stop that was set when the user gave this command. Says which
+    /// stop that is, and whether it was released.
+    pub fn resume(&mut self, config: &Config, before: Option<Stop>) -> Result<String> {
         if let Some(stop) = before {
-            let said = stop::describe(stop.origin(), stop.cause(), stop.at_ns());
-            crate::say(&format!("it was stopped {said}"))?;
+            let said = describe(stop.origin(), stop.cause(), stop.at_ns());
+            console::print(&format!("it was stopped {said}"))?;
         }
-        let answer = self.hands.ask(Ask {
-            kind: AskKind::Resume.into(),
-            stop_word: before.map_or(0, Stop::word),
-            lifetime_ms: u32::try_from(LATEST_MOVE.as_millis())?,
-            ..Ask::default()
-        })?;
-        match (answer.outcome.get(), before) {
-            (Some(Outcome::Done), Some(_)) if answer.stopped == 0 => {
-                Ok("the stop is released".into())
-            }
-            (Some(Outcome::Done), None) if answer.stopped == 0 => {
-                Ok("the robot was not stopped".into())
-            }
-            _ => match stop::current(config)? {
-                Some(stop) => bail!(
-                    "it stays stopped: a newer stop is set, {}; give `lager resume` anew to release it",
-                    stop::describe(stop.origin(), stop.cause(), stop.at_ns())
-                ),
-                None => bail!("the bridge does not release the stop now; try again"),
-            },
+        let stop = before.map_or(0, Stop::word);
+        let action = Action::Resume { stop };
+        let seen = self.seen(action)?;
+        let refused = self.give(action, &seen)?;
+        match (stop::current(config)?, refused) {
+            (None, None) => self.done(action, &seen),
+            (Some(stop), _) => bail!(
+                "it stays stopped: a newer stop is set, {}; give `lager resume` anew to release it",
+                describe(stop.origin(), stop.cause(), stop.at_ns())
+            ),
+            (None, Some(_)) => bail!("the bridge does not release the stop now; try again"),
         }
     }
 
-    /// `lager mode`.
-    pub fn mode(&self, mode: Mode) -> Result<String> {
-        self.ask(Ask {
-            kind: AskKind::SetMode.into(),
-            mode: mode.into(),
-            ..Ask::default()
-        })?;
-        Ok(match mode {
-            Mode::Manual => "the operator steers".into(),
-            Mode::Autonomous => "logic steers".into(),
-        })
-    }
-
-    /// `lager picked`: repeated until logic goes on, or refuses to because it does not feel the
-    /// goods.
-    pub fn picked(&self, force: bool) -> Result<String> {
-        let mut events = self.bus.subscriber::<MissionEvent>()?;
-        let mut status = self.bus.subscriber::<NavStatus>()?;
-        let waits = |phase| phase == Some(Phase::Picking);
-        if !waits(first(&mut status, &self.bus, &self.patience)?.phase.get()) {
-            bail!("the robot does not wait at a pick station; nothing is to be picked up now");
-        }
-        let input = Input {
-            kind: match force {
-                true => InputKind::PickupForced.into(),
-                false => InputKind::PickupDone.into(),
-            },
-            ..Input::default()
+    /// What the robot shows now, as far as this order needs it.
+    fn seen(&mut self, action: Action) -> Result<Seen> {
+        let patience = match action.latest() == LATEST_MOVE {
+            true => self.soon(),
+            false => self.patience.clone(),
         };
-        self.press_until(input, &mut status, |status| {
-            while let Some(event) = events.receive()? {
-                if event.kind.get() == Some(EventKind::PickupRefused) {
-                    let why = event.failure;
-                    bail!("logic refuses to leave: {why}; `lager picked --force` overrules it");
+        let mut seen = Seen {
+            health: Some(first(&mut self.health, &self.bus, &patience)?),
+            is_simulated: self.running.body.service().is_some(),
+            ..Seen::default()
+        };
+        if is_for_logic(action) {
+            let mut status = self.bus.subscriber::<NavStatus>()?;
+            seen.status = Some(first(&mut status, &self.bus, &patience)?);
+            seen.queue = Some(self.queue()?);
+        }
+        Ok(seen)
+    }
+
+    /// Gives an order and waits until the robot shows its effect, or until the reason of a refusal
+    /// is known.
+    fn give(&mut self, action: Action, seen: &Seen) -> Result<Option<Reason>> {
+        let mut status = self.bus.subscriber::<NavStatus>()?;
+        let mut queue = self.bus.subscriber::<MissionQueue>()?;
+        let mut events = self.bus.subscriber::<MissionEvent>()?;
+        let mut orders = Orders::default();
+        let begun = match orders.give(self.now(), Duration::ZERO, (), action, seen) {
+            Ok(begun) => begun,
+            Err(why) => return Ok(Some(why)),
+        };
+        let mut heard = None;
+        loop {
+            for act in orders.acts() {
+                match act {
+                    Act::Order(order) => self.hands.fetch(order)?,
+                    Act::Press(input) => self.hands.press(input)?,
+                    Act::Ask { id, ask } => {
+                        let answer = self.hands.ask(ask)?;
+                        orders.answered(id, Ok(answer), seen);
+                    }
+                    Act::AskWorld { id, ask } => {
+                        let world = self.bus.client::<WorldRequest>()?;
+                        let answer = world.call(ask, self.patience.left())?;
+                        orders.world_answered(self.now(), id, &Ok(answer));
+                    }
                 }
             }
-            Ok(!waits(status.phase.get()))
-        })?;
-        Ok("the robot takes the product to delivery".into())
-    }
-
-    /// `lager pick`: repeated until logic shows it.
-    pub fn pick(&self, pick: Pick) -> Result<String> {
-        let mut status = self.bus.subscriber::<NavStatus>()?;
-        let input = Input {
-            kind: match pick {
-                Pick::Manual => InputKind::PickByHand.into(),
-                Pick::Auto => InputKind::PickByItself.into(),
-            },
-            ..Input::default()
-        };
-        self.press_until(input, &mut status, |status| Ok(status.pick == pick))?;
-        Ok(match pick {
-            Pick::Manual => "a person picks the goods up".into(),
-            Pick::Auto => "the robot picks the goods up by itself".into(),
-        })
-    }
-
-    /// `lager reset`: repeated until logic has taken it.
-    pub fn reset(&self) -> Result<String> {
-        let mut status = self.bus.subscriber::<NavStatus>()?;
-        let input = Input {
-            kind: InputKind::ResetPressed.into(),
-            ..Input::default()
-        };
-        self.press_until(input, &mut status, |status| {
-            let phase = status.phase.get();
-            Ok(matches!(
-                phase,
-                Some(Phase::WaitingForOrder | Phase::WaitingForMap)
-            ))
-        })?;
-        Ok("the robot takes it that it stands on the delivery node".into())
-    }
-
-    /// `lager press switch`: the other mode. A press toggles, so it is made once.
-    pub fn switch(&mut self) -> Result<String> {
-        let before = self.health()?.mode;
-        self.hands.press(Input {
-            kind: InputKind::SwitchPressed.into(),
-            id: Hands::fresh_id(),
-            ..Input::default()
-        })?;
-        while !self.patience.is_over() {
-            if let Some(health) = self.health.latest()?
-                && health.mode != before
-            {
-                return Ok(match health.mode.get() {
-                    Some(Mode::Autonomous) => "logic steers".into(),
-                    _ => "the operator steers".into(),
-                });
+            if let Some(ended) = orders.ended().pop() {
+                return Ok(ended.result.err());
             }
-            self.patience.pause(Duration::from_millis(20))?;
-        }
-        bail!("the bridge does not react")
-    }
-
-    /// Presses a button until logic shows the effect.
-    fn press_until(
-        &self,
-        input: Input,
-        status: &mut Subscriber<NavStatus>,
-        mut done: impl FnMut(&NavigatorStatus) -> Result<bool>,
-    ) -> Result<()> {
-        let pressed = Clock::monotonic_ns();
-        let id = Hands::fresh_id();
-        loop {
-            self.hands.press(Input { id, ..input })?;
-            self.patience.pause(Duration::from_millis(50))?;
-            if let Some(status) = status.latest()?
-                && status.stamp().publish_time_ns > pressed
-                && done(&status)?
-            {
-                return Ok(());
+            if begun != Begun::Waits {
+                return Ok(None);
             }
-            if self.patience.is_over() {
-                bail!("logic does not react; is the robot up? (`lager up`)");
+            match is_for_logic(action) {
+                true => self.patience.pause(GLANCE)?,
+                // A calibration lasts longer than any call into the bus.
+                false => self.patience.rest(GLANCE)?,
             }
-        }
-    }
-
-    /// `lager gains`.
-    pub fn gains(&self, gain_p: u8, gain_d: u8) -> Result<String> {
-        let answer = self.ask(Ask {
-            kind: AskKind::SetGains.into(),
-            gain_p,
-            gain_d,
-            ..Ask::default()
-        })?;
-        Ok(format!(
-            "the gains in force are {} and {}",
-            answer.gain_p, answer.gain_d
-        ))
-    }
-
-    /// `lager calibrate`: waits for the end, and tells it.
-    pub fn calibrate(&mut self) -> Result<String> {
-        let ended_before = self.health()?.calibrations_ended;
-        self.ask(Ask {
-            kind: AskKind::Calibrate.into(),
-            ..Ask::default()
-        })?;
-        crate::say("calibrating for five seconds: move the robot over tape and floor")?;
-        let clock = self.bus.clock();
-        let give_up = clock.now() + CALIBRATION;
-        let mut heard = None;
-        while clock.now() < give_up {
             if let Some(health) = self.health.latest()? {
                 heard = Some(Instant::now());
-                if health.calibrations_ended != ended_before {
-                    return calibrated(&health);
-                }
+                orders.health(&health);
             }
+            if let Some(status) = status.latest()? {
+                orders.status(&status, status.stamp().publish_time_ns);
+            }
+            if let Some(queue) = queue.latest()? {
+                orders.queue(self.now(), &queue);
+            }
+            while let Some(event) = events.receive()? {
+                orders.event(&event);
+            }
+            orders.turn(self.now(), |()| true);
             if self.patience.is_silent(heard) {
-                bail!("the bridge has fallen silent; nobody knows how the calibration went");
+                bail!("the bridge has fallen silent; nobody knows what came of it");
             }
-            self.patience.rest(Duration::from_millis(20))?;
         }
-        bail!("the sensor board does not say how the calibration went; try again")
     }
 
-    fn ask(&self, ask: Ask) -> Result<Answer> {
-        let answer = self.hands.ask(ask)?;
-        match answer.outcome.get() {
-            Some(Outcome::Done) => Ok(answer),
-            Some(outcome) => Err(anyhow!("{outcome}")),
-            None => Err(anyhow!("the bridge answers what nobody here understands")),
+    fn now(&self) -> Moment {
+        Moment {
+            robot: self.bus.clock().now(),
+            ns: Clock::monotonic_ns(),
         }
     }
 
@@ -289,8 +193,14 @@ impl Operator {
         first(&mut self.health, &self.bus, &self.patience)
     }
 
+    /// How long an order that lets the robot move waits for it. If the bridge is frozen, no such order
+    /// waits for the next bridge: the robot would move when nobody expects it any more.
+    fn soon(&self) -> TimeLimit {
+        self.patience.at_most(Hands::ANSWER)
+    }
+
     /// Gives an order and renews it until it has finished or its time is over.
-    fn carry_out(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
+    fn steer(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
         let name = command.name();
         let health = self.health()?;
         if health.stopped != 0 {
@@ -300,65 +210,40 @@ impl Operator {
             );
         }
         if let Some(why) = health.blocked.get().filter(|why| *why != Refusal::None) {
-            bail!("`{name}` is not possible now: {why}");
+            bail!("`{name}` is not possible now: {}", hinted(why));
         }
         let mode = health.mode.get();
         let mut state = self.bus.subscriber::<SteeringState>()?;
-        let order = SteeringOrder {
-            id: Hands::fresh_id(),
-            origin: Origin::Operator.into(),
-            code: command.firmware().code(),
-            arm_granted: 0,
-            ..SteeringOrder::default()
-        };
         let clock = self.bus.clock();
         let end = match seconds {
             Some(seconds) => Some(clock.now() + Duration::try_from_secs_f64(seconds)?),
             None => None,
         };
+        let mut driving = Driving::default();
+        let whose = For::Action {
+            number: 0,
+            until_ns: None,
+        };
+        let order = driving.begin(
+            self.now(),
+            Duration::ZERO,
+            Ids::default().fresh(Clock::monotonic_ns()),
+            command,
+            whose,
+        );
+        self.hands.steer(order)?;
         let mut accepted = false;
-        let mut ended = None;
-        let mut renewed = clock.now();
-        // When the steering board reported last.
-        let mut reported = renewed;
         while end.is_none_or(|end| clock.now() < end) {
-            // This process was stopped and continued, or kept from its core: the order that it
-            // renewed is over.
-            let pause = clock.now().saturating_sub(renewed);
-            if pause >= LEASE {
-                bail!(
-                    "this command was held up for {} ms, so the robot stands; give it anew",
-                    pause.as_millis()
-                );
-            }
-            renewed = clock.now();
-            self.hands.steer(order)?;
-            // A user who lets go by Ctrl-C has done what he wanted.
-            if self.patience.rest(clock.real(RENEW)).is_err() {
+            let due = driving.due().unwrap_or_default().max(clock.now());
+            // A user who ends the command with Ctrl-C has succeeded.
+            if self.patience.rest(clock.real(due - clock.now())).is_err() {
                 break;
             }
             if let Some(report) = state.latest()? {
-                if report.age_ms == 0 {
-                    reported = clock.now();
-                }
-                let own =
-                    |origin: Option<Origin>, id| origin == Some(Origin::Operator) && id == order.id;
-                accepted |= own(report.current_origin.get(), report.current_id);
-                if own(report.finished_origin.get(), report.finished_id) {
-                    ended = report.finish.get();
-                }
+                driving.reported(clock.now(), &report);
             }
             if let Some(health) = self.health.latest()?.map(|health| *health) {
-                // An original board reports nothing, so its bridge has to do.
-                if health.steering.up != 0 && health.steering.version == Version::Original as u8 {
-                    reported = clock.now();
-                }
-                if health.refused_origin.get() == Some(Origin::Operator)
-                    && health.refused_id == order.id
-                    && let Some(why) = health.refusal.get()
-                {
-                    bail!("the bridge refuses `{name}`: {why}");
-                }
+                driving.refused(clock.now(), &health);
                 if health.stopped != 0 {
                     bail!("the robot has been stopped {}", by(&health));
                 }
@@ -366,23 +251,18 @@ impl Operator {
                     bail!("the mode has been changed; somebody else steers now");
                 }
                 if let Some(why) = health.blocked.get().filter(|why| *why != Refusal::None) {
-                    bail!("`{name}` was cut short: {why}");
-                }
-                match ended {
-                    Some(Finish::Done) => return Ok(format!("`{name}` is done")),
-                    Some(Finish::None) | None => (),
-                    Some(finish) => bail!("`{name}` {finish}"),
+                    bail!("`{name}` was cut short: {}", hinted(why));
                 }
             }
-            // Bridge or board may have gone, and what comes in its place must not move the robot by
-            // an order that was given before.
-            let unheard = clock.now().saturating_sub(reported);
-            if unheard >= REPORT_DEADLINE {
-                bail!(
-                    "the steering board has not reported for {} ms, so the robot stands; give it \
-                     anew",
-                    unheard.as_millis()
-                );
+            if let Some(order) = driving.renew(clock.now()) {
+                self.hands.steer(order)?;
+            }
+            accepted |= driving.has_begun();
+            if let Some(Err(why)) = driving.ended().pop().map(|ended| ended.result) {
+                bail!(hinted(why));
+            }
+            if !driving.is_running() {
+                return Ok(format!("`{name}` is done"));
             }
             if !accepted && self.patience.is_over() {
                 bail!("the robot does not carry out `{name}`; `lager doctor` looks for the cause");
@@ -392,27 +272,27 @@ impl Operator {
     }
 }
 
+/// Whether logic shows the effect; a request is answered by whoever it is put to.
+const fn is_for_logic(action: Action) -> bool {
+    use Action::{Calibrate, Gains, Mode, Obstacle, Resume};
+    !matches!(
+        action,
+        Mode(_) | Resume { .. } | Gains { .. } | Calibrate | Obstacle { .. }
+    )
+}
+
 /// Who has stopped the robot, and why.
 fn by(health: &Health) -> String {
     let cause = health.stop_cause.get().unwrap_or(StopCause::WordDamaged);
-    stop::describe(health.stop_origin.get(), cause, health.stopped_at_ns)
+    describe(health.stop_origin.get(), cause, health.stopped_at_ns)
 }
 
-/// How a calibration has ended.
-fn calibrated(health: &Health) -> Result<String> {
-    match health.calibration_failure() {
-        None => {
-            Ok("the line sensors are calibrated: each of them has seen both floor and tape".into())
-        }
-        Some(why) => bail!(why),
-    }
-}
-
-/// The state a topic holds; the services publish theirs several times a second.
+/// The last sample of a topic that carries a state. The services publish theirs several times a
+/// second.
 fn first<T: Topic>(
     subscriber: &mut Subscriber<T>,
     bus: &Bus,
-    patience: &Patience,
+    patience: &TimeLimit,
 ) -> Result<T::Payload> {
     loop {
         if let Some(sample) = subscriber.latest()? {
@@ -422,7 +302,7 @@ fn first<T: Topic>(
             bail!(
                 "nobody publishes {} of the robot `{}`; is it up? (`lager up`)",
                 T::NAME,
-                bus.robot()
+                bus.unit()
             );
         }
         patience.pause(Duration::from_millis(5))?;

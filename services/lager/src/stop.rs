@@ -1,15 +1,17 @@
-//! `lager stop`: sets the robot's stop word and says what became of it.
+//! `lager stop`: sets the robot's stop word and prints whether the wheels stand.
 //!
-//! It opens nothing of the bus, so it works when every place there is taken, when the bus's files
-//! are gone or damaged, and when the bridge is frozen. It reads the bridge's answers from the
-//! word's file, and asks the kernel what the bridge's process does.
+//! It opens nothing of the bus. So it works when the bus is full, when the bus's files are gone or
+//! damaged, and when the bridge is frozen. It reads the bridge's answers in the file of the stop
+//! word, and asks the kernel about the bridge's process.
 
 use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lager_ports::{Clock, Stop, StopPage, StopTold, StopWord};
+use lager_home::Clock;
+use lager_stop::{Stop, StopPage, StopTold, StopWord};
+use lager_supervisor::stopped::span;
 use lager_topics::{Role, StopCause};
 
 use crate::config::{Body, Config};
@@ -20,19 +22,19 @@ const PATIENCE: Duration = Duration::from_millis(2_500);
 /// How long to wait for a bridge that has not been seen yet.
 const SHORT: Duration = Duration::from_millis(300);
 
-/// How often the answer is looked at.
+/// How often the answer is checked.
 const LOOK: Duration = Duration::from_millis(1);
 
 /// A bridge turns at least every 20 ms.
 const SILENT: Duration = Duration::from_millis(200);
 
-/// What every failure begins with.
+/// Every failure begins with this.
 const MOVING: &str = "the robot may still be moving";
 
-/// Where the stop word of the robot lies that `config` names.
+/// The stop word of the robot in `config`.
 pub fn path(config: &Config) -> Result<PathBuf> {
     let bus = config.bus()?;
-    Ok(bus.place()?.folder_of(&bus.robot).join(StopPage::FILE))
+    Ok(bus.home()?.folder_of(&bus.unit).join(StopPage::FILE))
 }
 
 /// The stop that is set, if there is one.
@@ -51,7 +53,7 @@ pub fn run(config: &Config) -> Result<String> {
     set()?;
     loop {
         let Some(told) = StopWord::read(&path).context(MOVING)? else {
-            // Somebody has removed the file between.
+            // Somebody has removed the file meanwhile.
             set()?;
             continue;
         };
@@ -78,7 +80,7 @@ pub fn run(config: &Config) -> Result<String> {
     }
 }
 
-/// Stops real boards before anything of the robot is started; a stop that is set already stays.
+/// Stops real boards before the robot starts. A stop that is already set stays.
 pub fn at_start(config: &Config) -> Result<()> {
     if config.body == Body::Serial && current(config)?.is_none() {
         StopWord::set(&path(config)?, Role::Supervisor, StopCause::FreshStart)?;
@@ -86,39 +88,19 @@ pub fn at_start(config: &Config) -> Result<()> {
     Ok(())
 }
 
-/// A stop in words: who, when, why.
-pub fn describe(origin: Option<Role>, cause: StopCause, at_ns: u64) -> String {
-    let who = origin.map_or("nobody known", Role::as_author);
-    let when = match at_ns {
-        0 => String::new(),
-        at_ns => format!(" {} ago", span(StopTold::age(Clock::monotonic_ns(), at_ns))),
-    };
-    format!("by {who}{when} ({cause})")
-}
-
-/// A length of time as a person says it.
-fn span(time: Duration) -> String {
-    match time.as_secs() {
-        0 => format!("{} ms", time.as_millis()),
-        seconds @ 1..120 => format!("{seconds} s"),
-        seconds @ 120..7_200 => format!("{} min", seconds / 60),
-        seconds => format!("{} h", seconds / 3_600),
-    }
-}
-
-/// What is known of a stop.
+/// What is known after a stop.
 #[derive(Debug, PartialEq, Eq)]
 enum Verdict {
     /// The wheels stand.
     Stands(String),
-    /// Not yet, and why.
+    /// They do not stand yet, for this reason.
     NotYet(String),
-    /// It cannot be known whether they do.
+    /// Nobody can know whether they stand.
     Never(String),
 }
 
-/// Judges what the file tells at `now_ns` of a stop ordered at `ordered_ns`; `bridge` is the last
-/// bridge's process with its state, as the kernel has it.
+/// Judges, from the file at `now_ns`, a stop that was ordered at `ordered_ns`. `bridge` is the last
+/// bridge's process with its state, as the kernel says.
 fn judge(
     told: &StopTold,
     ordered_ns: u64,
@@ -185,7 +167,7 @@ fn judge(
     }
 }
 
-/// The state of a process as the kernel has it, if there is such a process.
+/// The state of a process as the kernel says, if there is such a process.
 fn state(process: u32) -> Option<char> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // The state follows the name, which is in parentheses and may contain anything.
@@ -226,18 +208,6 @@ mod tests {
         ] {
             let said = why(judge(&told, now_ns, now_ns, bridge));
             assert!(said.contains(words), "{said}");
-        }
-    }
-
-    #[test]
-    fn spans_are_told_as_people_say_them() {
-        for (millis, said) in [
-            (7, "7 ms"),
-            (1_400, "1 s"),
-            (200_000, "3 min"),
-            (9_000_000, "2 h"),
-        ] {
-            assert_eq!(span(Duration::from_millis(millis)), said);
         }
     }
 }

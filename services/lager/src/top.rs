@@ -10,16 +10,16 @@ use lager_topics::Role;
 
 use crate::cli::TopArgs;
 use crate::config::Config;
-use crate::patience::Patience;
+use crate::time_limit::TimeLimit;
 use crate::{diagnose, exit, topic};
 
-/// How long the one picture is measured.
+/// How long to measure for the one picture.
 const ONCE: Duration = Duration::from_secs(2);
 
 /// Shows it until a key, or prints one picture.
-pub fn run(config: &Config, args: &TopArgs, patience: &Patience) -> Result<()> {
+pub fn run(config: &Config, args: &TopArgs, patience: &TimeLimit) -> Result<()> {
     if !args.once && !std::io::stdout().is_terminal() {
-        let what = "standard output is no terminal; `lager top --once` prints one picture";
+        let what = "standard output is not a terminal; `lager top --once` prints one picture";
         return Err(exit::Usage(what.to_owned()).into());
     }
     if let Some(file) = &args.bag {
@@ -47,7 +47,7 @@ pub fn run(config: &Config, args: &TopArgs, patience: &Patience) -> Result<()> {
 }
 
 /// The same over a recording.
-fn over(file: &Path, args: &TopArgs, patience: &Patience) -> Result<()> {
+fn over(file: &Path, args: &TopArgs, patience: &TimeLimit) -> Result<()> {
     let name = file.display().to_string();
     let mut recorded = None;
     let layouts = lager_recorder::samples(file, &mut |sample| {

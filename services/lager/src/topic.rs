@@ -1,4 +1,4 @@
-//! `lager topic`: joins the bus for the topic tools, and hands them standard output and input.
+//! `lager topic`: joins the bus for the topic tools, and gives them standard input and output.
 
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
@@ -6,27 +6,33 @@ use std::sync::mpsc::{Receiver, sync_channel};
 
 use anyhow::{Context, Result, anyhow};
 use lager_monitor::{EchoConfig, Payloads, PublishError, Publishing, ToolError, Tools};
-use lager_ports::{Bus, Watchdog};
+use lager_ports::Bus;
 use lager_topics::{Role, TOPICS, UnknownTopic};
+use lager_wake::Watchdog;
 use serde_json::Value;
 
 use crate::cli::{TopicArgs, TopicCommand};
 use crate::config::Config;
 use crate::meant::unknown_topic;
-use crate::patience::Patience;
+use crate::time_limit::TimeLimit;
 use crate::{diagnose, exit};
 
-/// Payloads that are read ahead of their publication.
+/// How many payloads are read before the tool publishes them.
 const READ_AHEAD: usize = 16;
 
 /// The topic tools, on standard output.
-pub fn run(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patience) -> Result<()> {
+pub fn run(
+    config: &Config,
+    args: TopicArgs,
+    every_robot: bool,
+    patience: &TimeLimit,
+) -> Result<()> {
     if let TopicCommand::Echo { watch, .. }
     | TopicCommand::Hz { watch }
     | TopicCommand::Bw { watch }
     | TopicCommand::Delay { watch } = &args.command
         && !watch.wait
-        // Other people's topics need no robot.
+        // Topics of other programs need no robot.
         && TOPICS.iter().any(|entry| entry.name == watch.topic)
     {
         diagnose::must_be_up(config)?;
@@ -46,7 +52,7 @@ pub fn run(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patie
     let shown = match args.command {
         TopicCommand::List => {
             let listed = tools.list(every_robot);
-            // A name of which there is nothing is nobody's.
+            // A name under which nothing is open belongs to nobody.
             if matches!(listed, Ok(0)) && !every_robot {
                 diagnose::must_be_up(config)?;
             }
@@ -102,7 +108,7 @@ pub fn join(config: &Config, role: Role, watchdog: &Watchdog) -> Result<Bus> {
     watchdog.over("joining the bus", join)
 }
 
-/// A reader that has gone, as after `| head`, is no error.
+/// If the output's reader has gone, as after `| head`, that is not an error.
 fn ended(shown: Result<()>, out: &mut impl Write) -> Result<()> {
     let flushed = shown.and_then(|()| Ok(out.flush().map_err(ToolError::Output)?));
     match flushed {
@@ -117,7 +123,7 @@ fn ended(shown: Result<()>, out: &mut impl Write) -> Result<()> {
     }
 }
 
-/// A field or a topic that there is not makes no sense, whatever the robot does.
+/// An unknown field or topic makes no sense, whatever the robot does.
 fn as_usage(error: ToolError, bus: &Bus, watchdog: &Watchdog) -> anyhow::Error {
     match error {
         ToolError::NoField(error) => exit::Usage(error.to_string()).into(),
@@ -126,7 +132,7 @@ fn as_usage(error: ToolError, bus: &Bus, watchdog: &Watchdog) -> anyhow::Error {
     }
 }
 
-/// That there is no such topic, and which one may have been meant of those that are open.
+/// Says that there is no such topic, and suggests one of the open topics.
 fn unknown(topic: &str, bus: &Bus, watchdog: &Watchdog) -> String {
     let open = watchdog.over("listing the topics", || bus.topics());
     let open: Vec<String> = open.into_iter().flatten().map(|topic| topic.name).collect();
@@ -165,8 +171,8 @@ fn parsed(text: &str) -> Result<Value> {
     parsed.map_err(|error| exit::Usage(format!("the payload is no JSON: {error}")).into())
 }
 
-/// The JSON values on standard input, read by a thread that ends with the process: a read of a
-/// terminal cannot be called back.
+/// The JSON values on standard input. A thread reads them and ends with the process, because a read
+/// from a terminal cannot be stopped.
 fn read_on() -> Result<Receiver<Result<Value, String>>> {
     let (to, from) = sync_channel(READ_AHEAD);
     let read = move || {

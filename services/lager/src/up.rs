@@ -1,55 +1,50 @@
 //! `lager up`: the whole robot on this machine, as supervised processes that meet on the bus.
 //!
-//! This process takes no decision for the robot. It opens, maps and sweeps nothing on the bus, so
-//! nothing there can hold it up or end it. It starts the services, restarts them, answers signals,
-//! and shows what it is told. Its child, the attendant (`attend.rs`), does what needs the bus.
+//! This file puts together what the robot starts with; `lager-supervisor` starts it and watches it.
 
-mod attendant;
 mod external;
-mod figures;
-mod resets;
-mod robot;
-mod stage;
 
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
-use lager_lines::{Called, ProductId};
+use lager_floor::ProductId;
+use lager_home::Clock;
+use lager_lines::Called;
+use lager_operator::Ids;
+use lager_orders::Pick;
 use lager_plant::Warehouse;
+use lager_supervisor::kept_orders::{Keeping, KeptFile, KeptOrders};
+use lager_supervisor::mission::Mission;
+use lager_supervisor::runtime_folder::RuntimeFolder;
+use lager_supervisor::signals::Signals;
+use lager_supervisor::state_folder::{self, StateFolder, WarehouseCopy};
+use lager_supervisor::{Plan, Robot, Service, Terminal};
 use lager_topics::Role;
 
 use crate::cli::UpArgs;
-use crate::config::{Body, ChipSection, Config, PickBy, StationSection};
+use crate::config::{self, Body, ChipSection, Config, StationSection};
 use crate::exit;
 use crate::gateway;
-use crate::hands::Hands;
-use crate::kept::{Keeping, Kept, KeptFile};
-use crate::mission::Mission;
-use crate::runtime::RuntimeFolder;
-use crate::signals::Signals;
-use crate::state::{self, StateFolder, World};
 use crate::station;
 use crate::stop;
-use crate::terminal::Terminal;
-use crate::voice;
+use crate::traces;
 use external::External;
-use robot::Robot;
 
-/// Runs until Ctrl-C, or until the mission has ended when that was asked for.
+/// Runs until Ctrl-C, or with `--exit-when-done` until the mission has ended.
 pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let signals = Signals::listen()?;
     apply(&mut config, args)?;
     config.validate()?;
-    let state = StateFolder::of_robot(&config)?;
+    let state = StateFolder::of_robot(&config.state_root()?, &config.name);
     let mut notes = choose_warehouse(&mut config, &state)?;
     let products = products(&config, args)?;
     if args.script {
-        // Nobody is to be in its way, so nobody is there who would move the arm.
-        config.logic.pick.get_or_insert(PickBy::Auto);
+        // Nobody may be in its way, so nobody is there to move the arm.
+        config.logic.pick.get_or_insert(Pick::Auto);
     }
     rehearse(&config)?;
 
-    let folder = RuntimeFolder::create(&config)?;
+    let folder = RuntimeFolder::create(&config.bus()?)?;
     let mut lock = folder.lock()?;
     if config.body != Body::Serial {
         config.serial.sensor = folder.sensor_port();
@@ -58,51 +53,73 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     match config.body {
         Body::Sim => config.chip.clock = None,
         Body::Chip => equip(&mut config, &folder)?,
-        // The ports may be those of an emulator that somebody else runs.
+        // The ports may belong to an emulator that somebody else runs.
         Body::Serial => {}
     }
     state.make()?;
     let _tidy = Tidy(&state);
-    let world = run_in_copy(&mut config, &state)?;
+    let warehouse = run_in_copy(&mut config, &state)?;
     config.station.queue = Some(match args.exit_when_done {
         true => folder.queue(),
         false => config.station.queue.take().unwrap_or_else(|| state.queue()),
     });
     let mut external = external::choose(&mut config, &mut lock, args.headless)?;
     if external.listener.is_none() {
-        // What somebody else keeps is not known here.
+        // Nobody here knows what somebody else's station keeps.
         (config.station.warehouse, config.station.queue) = (None, None);
     }
     external.gateway = gateway::promise(&config)?;
-    folder.write_config(&config)?;
-    let mut kept: Kept = state::read_kept(&state.orders(), &mut notes)?;
+    let text = toml::to_string(&config)?;
+    folder.write_config(&text)?;
+    let mut kept: KeptOrders = state_folder::read_kept(&state.orders(), &mut notes)?;
     if args.exit_when_done && !kept.is_nothing() {
-        // A script does what it is told, and leaves the rest to whoever drives next.
+        // A script carries out only its own orders, and leaves the others to a later `up`.
         notes
-            .push("the orders that wait from before are left for an `up` that is no script".into());
-        kept = Kept::default();
+            .push("the orders that wait from before stay for a later `up` without --script".into());
+        kept = KeptOrders::default();
     }
     let mission = ordered(&config, &external, products, args, &mut kept)?;
     notes.extend(kept.sentence());
 
     stop::at_start(&config)?;
-    let terminal = Terminal::new(args.json, voice::are_traced(&config.log))?;
-    let mut robot = Robot::new(config, lock, external, mission, signals, terminal)?;
-    (robot.first_notes, robot.world) = (notes, world);
-    if !args.exit_when_done {
-        robot.keeping = Keeping::new(kept, KeptFile::new(state.orders()));
-    }
-    let ran = robot.run(args.exit_when_done);
-    let outcome = robot.finish(args.exit_when_done, args.json);
+    let terminal = Terminal::new(args.json, traces::are_shown(&config.log))?;
+    let talkers = [
+        (external.listener.is_some(), Service::Station),
+        (config.station.wanted, Service::Comm),
+        (config.gateway.is_wanted(), Service::Gateway),
+    ];
+    let told = [external.told].into_iter();
+    let told = told.chain(external.panel).chain(external.gateway);
+    let plan = Plan {
+        config: text,
+        bus: config.bus()?,
+        body: config.body.service(),
+        talkers: talkers
+            .into_iter()
+            .filter_map(|(is_wanted, service)| is_wanted.then_some(service))
+            .collect(),
+        listener: external.listener,
+        eeprom: config.chip.eeprom,
+        warehouse,
+        mission,
+        keeping: match args.exit_when_done {
+            true => Keeping::default(),
+            false => Keeping::new(kept, KeptFile::new(state.orders())),
+        },
+        first_notes: told.chain(notes).collect(),
+        exit_when_done: args.exit_when_done,
+    };
+    let mut robot = Robot::new(plan, lock, signals, terminal)?;
+    let ran = robot.run();
+    let delivered = robot.finish(args.json);
     ran?;
-    Ok(if outcome?.failure.is_some() {
-        exit::not_delivered()
-    } else {
-        ExitCode::SUCCESS
+    Ok(match delivered? {
+        true => ExitCode::SUCCESS,
+        false => exit::not_delivered(),
     })
 }
 
-/// Leaves nothing in the state folder that is of no use to the next `up`.
+/// Removes from the state folder what the next `up` does not need.
 struct Tidy<'a>(&'a StateFolder);
 
 impl Drop for Tidy<'_> {
@@ -111,34 +128,43 @@ impl Drop for Tidy<'_> {
     }
 }
 
-/// Has the robot run in a copy of its warehouse's file, so that a process that is started again
-/// finds the world as it is now. A built-in one needs none.
-fn run_in_copy(config: &mut Config, state: &StateFolder) -> Result<Option<World>> {
+/// Runs the robot in a copy of its warehouse's file, so that a service that starts again finds the
+/// same world. A built-in warehouse needs no copy.
+fn run_in_copy(config: &mut Config, state: &StateFolder) -> Result<Option<WarehouseCopy>> {
     if Warehouse::builtin(&config.warehouse).is_some() {
         return Ok(None);
     }
-    let world = World {
+    let copy = WarehouseCopy {
         folder: state.clone(),
-        warehouse: config.warehouse()?,
+        text: toml::to_string(&config.warehouse()?)?,
     };
-    config.warehouse = world.write()?.display().to_string();
-    Ok(Some(world))
+    config.warehouse = copy.write()?.display().to_string();
+    Ok(Some(copy))
 }
 
-/// Chooses the warehouse, and where its changes are kept; what to tell people of it.
+/// Chooses the warehouse, and where its changes are kept. Returns what people should know of it.
 fn choose_warehouse(config: &mut Config, state: &StateFolder) -> Result<Vec<String>> {
-    if config.station.warehouse.is_none() {
-        config.station.warehouse = Some(state.warehouse(&config.warehouse)?);
+    let name = config.warehouse.clone();
+    let is_builtin = Warehouse::builtin(&name).is_some();
+    let keeps = &mut config.station.warehouse;
+    if keeps.is_none() {
+        *keeps = Some(match is_builtin {
+            true => state.warehouse(&name),
+            false => std::path::absolute(&name)?,
+        });
     }
-    let (saved, note) = state.saved(&config.warehouse);
+    if !is_builtin {
+        return Ok(Vec::new());
+    }
+    let (saved, note) = state.saved(&name, |file| config::warehouse(file).map(drop));
     if let Some(saved) = saved {
         config.warehouse = saved;
     }
     Ok(note.into_iter().collect())
 }
 
-/// What the robot is to fetch from the start, if anybody is to see to that. Real boards do not move
-/// off by themselves: there somebody has to ask for it twice.
+/// The orders with which the robot starts, if `up` gives any. Real boards do not move off by
+/// themselves: a person must ask for it with two flags.
 fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
     let warehouse = config.warehouse()?;
     if config.station.wanted && config.station.address.is_some() {
@@ -148,7 +174,7 @@ fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
     let usage = |why: &str| exit::Usage(why.to_owned());
     if config.body != Body::Serial {
         let is_elsewhere = config.station.wanted && config.station.address.is_some();
-        // Whoever has the station orders there.
+        // The person who has the station gives orders there.
         return match (is_elsewhere && args.mission.is_empty(), args.exit_when_done) {
             (true, true) => bail!(usage(
                 "--exit-when-done waits for the end of a mission; with the station of somebody else there is one with --mission"
@@ -174,16 +200,16 @@ fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
     }
 }
 
-/// Puts what is to be fetched into the queue of the robot's own station. Where there is none, the
-/// robot's own queue is given it. What waits from before goes first, in the robot's own queue; the
-/// first product of the warehouse is fetched only if nothing else is to be. Real boards carry out
-/// what somebody orders, and that is counted.
+/// Puts the orders into the queue of the robot's own station, or into the robot's own queue if it
+/// has no station. Orders from before come first, in the robot's own queue. Without any other order
+/// the robot fetches the first product of the warehouse. Real boards carry out what somebody
+/// orders, and that is counted.
 fn ordered(
     config: &Config,
     external: &External,
     mut products: Option<Vec<i32>>,
     args: &UpArgs,
-    kept: &mut Kept,
+    kept: &mut KeptOrders,
 ) -> Result<Mission> {
     let known: Vec<i32> = config
         .warehouse()?
@@ -193,7 +219,7 @@ fn ordered(
         .collect();
     kept.orders.retain(|order| known.contains(&order.product));
     if config.body != Body::Serial {
-        // Its world is a new one.
+        // The world of a simulated robot is new.
         kept.gone.clear();
     }
     let is_own = external.listener.is_some();
@@ -214,15 +240,15 @@ fn ordered(
         None => Mission::of_others(),
         Some(products) if is_own => Mission::of_station(&products),
         Some(products) => {
-            let mut mission = Mission::of_robot(&products, Hands::fresh_id());
+            let first = Ids::default().fresh(Clock::monotonic_ns());
+            let mut mission = Mission::of_robot(&products, first);
             mission.leave(|product| kept.has(product));
             mission
         }
     })
 }
 
-/// Refuses before anything runs what the services would be refused, again and again, at every
-/// start.
+/// Refuses, before anything runs, what the machine would refuse to the services at every start.
 fn rehearse(config: &Config) -> Result<()> {
     let roles = [Role::Bridge, Role::Logic, Role::Simulator]
         .map(|role| (role, config.realtime.wanted(role)));
@@ -233,7 +259,7 @@ fn rehearse(config: &Config) -> Result<()> {
     Ok(())
 }
 
-/// Chooses the places of an emulated body's files, and finds out whether it has all it needs.
+/// Chooses the places of an emulated body's files, and checks that no file is missing.
 fn equip(config: &mut Config, folder: &RuntimeFolder) -> Result<()> {
     let chip = &mut config.chip;
     let parts = chip.parts(config.serial.baud)?;
@@ -250,7 +276,7 @@ fn equip(config: &mut Config, folder: &RuntimeFolder) -> Result<()> {
     Ok(())
 }
 
-/// The products to fetch: those asked for, or the warehouse's first.
+/// The products to fetch: those of `--mission`, or the warehouse's first.
 pub fn mission(warehouse: &Warehouse, wanted: &[Called]) -> Result<Vec<i32>> {
     let known = warehouse.products.iter();
     let known = known.map(|product| (product.id, product.name.as_deref()));
@@ -277,7 +303,7 @@ pub fn mission(warehouse: &Warehouse, wanted: &[Called]) -> Result<Vec<i32>> {
     Ok(found.into_iter().map(ProductId::get).collect())
 }
 
-/// Somebody else's station may call other goods so.
+/// Refuses names for somebody else's station: it may use them for other goods.
 fn numbers_only(wanted: &[Called]) -> Result<()> {
     let is_name = |called: &&Called| matches!(called, Called::Name(_));
     match wanted.iter().find(is_name) {
@@ -288,7 +314,7 @@ fn numbers_only(wanted: &[Called]) -> Result<()> {
     }
 }
 
-/// Puts the command line's wishes over the configuration's.
+/// Lets the flags of the command line replace values of the configuration.
 fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
     if let Some(body) = args.body {
         config.body = body;
@@ -340,7 +366,7 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
         };
     }
     if args.listen.is_some() || args.gag.is_some() {
-        // Both are those of a station that is started here.
+        // Both flags are for a station that `up` starts.
         config.station.wanted = true;
         config.station.address = None;
     }

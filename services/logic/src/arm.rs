@@ -1,22 +1,22 @@
-//! What is known of the arm: where its joints are, and what its claw holds.
+//! What the navigator knows of the arm: where its joints are, and whether its claw holds something.
 
 use lager_topics::{FailureKind, Joint, SERVO_UNKNOWN, SteeringReport};
 use lager_wire::{ArmPose, ArmProfile};
 
-/// Place of the base's servo in a report.
+/// Index of the base's servo in a report.
 pub(crate) const BASE: usize = 0;
-/// Place of the shoulder's servo.
+/// Index of the shoulder's servo.
 pub(crate) const SHOULDER: usize = 1;
-/// Place of the elbow's servo.
+/// Index of the elbow's servo.
 pub(crate) const ELBOW: usize = 3;
 const WRIST: usize = 5;
 const CLAW: usize = 7;
 
-/// What was last heard of the arm.
+/// The last report of the arm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ArmSeen {
     position: [u16; 8],
-    /// Which of them were heard in this life of the link.
+    /// Which servos have reported in this life of the link.
     heard: [bool; 8],
     claw_load: i16,
     life: Option<u32>,
@@ -34,8 +34,8 @@ impl Default for ArmSeen {
 }
 
 impl ArmSeen {
-    /// A bridge that has just started knows no servo. What was known before is still believed of
-    /// an arm at rest, since only the bridge can move it; but see [`heard`](Self::heard).
+    /// Takes a report. A bridge that has just started knows no servo. The navigator then keeps its
+    /// earlier knowledge, since only the bridge can move the arm; but see [`heard`](Self::heard).
     pub(crate) fn take(&mut self, report: &SteeringReport) {
         if self.life != Some(report.link_epoch) {
             (self.life, self.heard) = (Some(report.link_epoch), [false; 8]);
@@ -51,28 +51,28 @@ impl ArmSeen {
         }
     }
 
-    /// Where a servo stands, if it has been heard.
+    /// A servo's position, if it has reported.
     pub(crate) fn position(&self, servo: usize) -> Option<u16> {
         Some(self.position[servo]).filter(|position| *position != SERVO_UNKNOWN)
     }
 
-    /// Where a servo stands, if it was heard in this life of the link. A board that has restarted
-    /// may have let the arm sag.
+    /// A servo's position, if it has reported in this life of the link. When a board restarts, the
+    /// arm may sag.
     pub(crate) fn heard(&self, servo: usize) -> Option<u16> {
         self.position(servo).filter(|_| self.heard[servo])
     }
 
-    /// Whether no servo has been heard in this life of the link.
+    /// Whether no servo has reported in this life of the link.
     pub(crate) fn is_unheard(&self) -> bool {
         self.heard == [false; 8]
     }
 
-    /// Which life of the link to the steering board the last report came from.
+    /// The life of the link to the steering board in which the last report came.
     pub(crate) fn life(&self) -> Option<u32> {
         self.life
     }
 
-    /// The first joint that is not where `pose` has it, where it is, and where it should be.
+    /// The first joint that is not as in `pose`, its position, and its position in `pose`.
     pub(crate) fn joint_off(&self, pose: ArmPose, tolerance: u16) -> Option<(Joint, u16, u16)> {
         [
             (Joint::Base, BASE, pose.base),
@@ -85,8 +85,8 @@ impl ArmSeen {
         .find(|(_, found, wanted)| found.abs_diff(*wanted) > tolerance)
     }
 
-    /// Why the claw is believed to hold nothing, with what was expected and seen; `None` if it
-    /// holds something. `margin` is how far goods keep it from closing, at least.
+    /// Why the claw seems to hold nothing, with the expected and the seen value; `None` if it holds
+    /// something. `margin` is how far goods keep it from closing, at least.
     pub(crate) fn claw_is_empty(
         &self,
         profile: &ArmProfile,

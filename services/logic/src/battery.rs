@@ -1,38 +1,38 @@
-//! Whether the battery is low, as far as it is to be believed, and whether a person knows.
+//! Decides whether the battery is low, and remembers whether a person knows.
 
 use core::time::Duration;
 
-/// The battery as it is believed to be.
+/// What the navigator believes of the battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Battery {
     /// It is low.
     low: bool,
     /// A person has told the robot to work all the same.
     accepted: bool,
-    /// Since when the reports contradict `low`.
+    /// Since when the reports say the opposite of `low`.
     contradicted: Option<Duration>,
 }
 
-/// From when on a battery is low, and charged again.
+/// When a battery counts as low, and when as charged again.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     /// Tenths of a volt below which it is low; 0 = never.
     pub(crate) low: u8,
-    /// How much above that it is charged again.
+    /// How much higher it must be to count as charged again.
     pub(crate) charged_by: u8,
-    /// For how long it must be so.
+    /// How long it must be so.
     pub(crate) steady: Duration,
 }
 
 impl Battery {
-    /// A low battery for which a predecessor stood still.
+    /// A low battery; an earlier navigator stood still because of it.
     pub(crate) const LOW: Self = Self {
         low: true,
         accepted: false,
         contradicted: None,
     };
 
-    /// Whether no new way may be begun.
+    /// Whether the robot must begin no new way.
     pub(crate) fn forbids(self) -> bool {
         self.low && !self.accepted
     }
@@ -42,7 +42,8 @@ impl Battery {
         self.accepted = self.low;
     }
 
-    /// Takes a reading, in tenths of a volt; 0 = unknown. Whether it is low, if that has changed.
+    /// Takes a reading, in tenths of a volt; 0 = unknown. Returns whether the battery is low, if
+    /// that has changed.
     pub(crate) fn read(&mut self, now: Duration, decivolts: u8, limits: Limits) -> Option<bool> {
         if limits.low == 0 || decivolts == 0 {
             return None;

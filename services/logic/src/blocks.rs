@@ -1,19 +1,18 @@
-//! What blocks ways at run time: which way, since when, and who says so. The map never changes
-//! ([`crate::map`]), and a block is never part of the published map.
+//! The ways that are blocked now: which, since when, and who says so. The map never changes
+//! ([`crate::map`]) and never has blocks.
 //!
-//! It is told what is blocked and asked what is open. It senses nothing. It forgets a block only
-//! when it is told to, or, when its places are full, the oldest block that the robot has found by
-//! itself.
+//! The navigator tells this file which ways are blocked and asks it which are open. It senses
+//! nothing. It forgets a block only when the navigator says so, or when it is full: then it forgets
+//! the oldest block that the robot itself has found.
 
 use core::time::Duration;
 
-use lager_topics::{BlockSource, BlockedWay, BlockedWays, Heading};
+use lager_floor::{Heading, MAX_NODES, MAX_SQUARES, Node};
+use lager_topics::{BlockSource, BlockedWay, BlockedWays};
 
-use crate::heading::Compass;
-use crate::map::{MAX_SIDE, Map};
-use crate::node::Node;
+use crate::map::Map;
 
-/// Most ways that can be blocked at once.
+/// How many ways can be blocked at once.
 pub const MAX_BLOCKS: usize = 64;
 
 /// A blocked way.
@@ -34,8 +33,8 @@ pub struct Block {
 pub struct Blocks {
     list: heapless::Vec<Block, MAX_BLOCKS>,
     /// For each node the blocked headings, a bit each; both ends of a way have theirs.
-    closed: [u8; MAX_SIDE * MAX_SIDE],
-    /// Counts changes, so that a result computed with these blocks can be recognised as outdated.
+    closed: [u8; MAX_NODES],
+    /// Counts changes, so that others can see whether their results are out of date.
     revision: u32,
 }
 
@@ -43,28 +42,28 @@ impl Default for Blocks {
     fn default() -> Self {
         Self {
             list: heapless::Vec::new(),
-            closed: [0; MAX_SIDE * MAX_SIDE],
+            closed: [0; MAX_NODES],
             revision: 0,
         }
     }
 }
 
 impl Blocks {
-    /// Whether one can go from `node` along `heading` to the next node.
+    /// Whether the way from `node` along `heading` to the next node is open.
     pub fn is_open(&self, map: &Map, node: Node, heading: Heading) -> bool {
-        map.contains(node)
+        map.grid.contains(node)
             && self.closed[place(node)] & bit(heading) == 0
-            && map.neighbour(node, heading).is_some()
+            && map.grid.neighbour(node, heading).is_some()
     }
 
-    /// Closes the way from `node` along `heading` at both of its ends (addObstacle of L4, and
-    /// AMB-47). Whether there was an open way; one that was blocked before keeps its time.
+    /// Blocks the way from `node` along `heading` at both of its ends (addObstacle of L4, and
+    /// AMB-47). Returns whether it was open. A way that was already blocked keeps its time.
     pub fn block(&mut self, map: &Map, block: Block) -> bool {
         if !self.is_open(map, block.node, block.heading) {
             return false;
         }
         if self.list.is_full() {
-            // A person's block is forgotten only if there is no other to forget.
+            // Forget a person's block only if there is no other.
             let sensed = |block: &Block| block.source == BlockSource::Sensor;
             let oldest = self.list.iter().position(sensed).unwrap_or(0);
             let oldest = self.list.remove(oldest);
@@ -76,7 +75,7 @@ impl Blocks {
         true
     }
 
-    /// Opens a way again. Whether it was blocked.
+    /// Opens a way again. Returns whether it was blocked.
     pub fn open(&mut self, node: Node, heading: Heading) -> bool {
         let Some(index) = self.list.iter().position(|block| {
             let far = block.heading.step_from(block.node);
@@ -90,8 +89,8 @@ impl Blocks {
         true
     }
 
-    /// Opens every way that the robot itself has found blocked, up to and including `until`.
-    /// Whether there was one.
+    /// Opens every way that the robot itself has found blocked, up to `until`. Returns whether
+    /// there was one.
     pub fn open_sensed(&mut self, until: Duration) -> bool {
         let before = self.list.len();
         while let Some(index) = self
@@ -105,7 +104,7 @@ impl Blocks {
         self.list.len() != before
     }
 
-    /// When the robot itself last found a way blocked that is blocked still.
+    /// When the robot itself last found a way blocked that is still blocked.
     pub fn last_sensed(&self) -> Option<Duration> {
         self.list
             .iter()
@@ -114,7 +113,7 @@ impl Blocks {
             .max()
     }
 
-    /// As they are published, except for what only the map and the mission know.
+    /// The blocks in their published form, without what only the map and the mission know.
     pub fn to_payload(&self) -> BlockedWays {
         let mut ways = BlockedWays::default();
         for (place, block) in ways.ways.iter_mut().zip(&self.list) {
@@ -131,7 +130,7 @@ impl Blocks {
         ways
     }
 
-    /// As a predecessor published them; what makes no sense is left out.
+    /// The blocks that an earlier navigator published. Impossible ones are left out.
     pub fn from_payload(ways: &BlockedWays) -> Self {
         let mut blocks = Self::default();
         for way in ways.ways() {
@@ -139,7 +138,7 @@ impl Blocks {
             let (Some(heading), Some(source)) = (way.heading.get(), way.source.get()) else {
                 continue;
             };
-            let is_inside = |node: Node| usize::from(node.x.max(node.y)) < MAX_SIDE;
+            let is_inside = |node: Node| node.x.max(node.y) <= MAX_SQUARES;
             if is_inside(node) && heading.step_from(node).is_some_and(is_inside) {
                 let block = Block {
                     node,
@@ -148,14 +147,14 @@ impl Blocks {
                     source,
                 };
                 blocks.mark(&block, true);
-                // As many places as the published list has.
+                // The published list has as many places.
                 let _ = blocks.list.push(block);
             }
         }
         blocks
     }
 
-    /// Forgets all of them: this is another floor.
+    /// Forgets all of them, because the floor is another one.
     pub fn clear(&mut self) {
         while let Some(block) = self.list.pop() {
             self.mark(&block, false);
@@ -172,7 +171,7 @@ impl Blocks {
         self.list.iter()
     }
 
-    /// Another number after each change.
+    /// A number that changes with each change.
     pub(crate) fn revision(&self) -> u32 {
         self.revision
     }
@@ -196,7 +195,7 @@ impl Blocks {
 
 /// A node's place in the table, whatever the size of the floor.
 fn place(node: Node) -> usize {
-    usize::from(node.y) * MAX_SIDE + usize::from(node.x)
+    usize::from(node.y) * (usize::from(MAX_SQUARES) + 1) + usize::from(node.x)
 }
 
 fn bit(heading: Heading) -> u8 {
@@ -208,7 +207,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::heading::HEADINGS;
 
     fn block(x: u8, y: u8, heading: Heading, seconds: u64) -> Block {
         Block {
@@ -292,21 +290,21 @@ mod tests {
             let map = Map::grid(width, height);
             let mut blocks = Blocks::default();
             for (x, y, heading, open) in ways {
-                let (node, heading) = (Node::new(x, y), HEADINGS[heading]);
+                let (node, heading) = (Node::new(x, y), Heading::ALL[heading]);
                 let was_open = blocks.is_open(&map, node, heading);
                 if open {
-                    let is_way = map.contains(node) && map.neighbour(node, heading).is_some();
+                    let is_way = map.grid.contains(node) && map.grid.neighbour(node, heading).is_some();
                     prop_assert_eq!(blocks.open(node, heading), is_way && !was_open);
                 } else {
                     prop_assert_eq!(blocks.block(&map, block(x, y, heading, 0)), was_open);
                     prop_assert!(!blocks.is_open(&map, node, heading));
                 }
             }
-            for index in 0..map.node_count() {
-                let node = map.node(index);
-                for heading in HEADINGS {
+            for index in 0..map.grid.node_count() {
+                let node = map.grid.node(index);
+                for heading in Heading::ALL {
                     if blocks.is_open(&map, node, heading) {
-                        let next = map.neighbour(node, heading).unwrap();
+                        let next = map.grid.neighbour(node, heading).unwrap();
                         prop_assert!(blocks.is_open(&map, next, heading.back()));
                     }
                 }

@@ -1,13 +1,14 @@
-//! Whether somebody has driven the robot by hand since the navigator was last sure of its place.
+//! Finds out whether somebody has driven the robot by hand since the navigator last knew its place.
 //!
-//! The bridge sums what the wheels turn in manual mode, over all lives of both services, so that a
-//! navigator that was not running then finds out as well. This file only compares and converts.
+//! In manual mode the bridge sums the turning of the wheels, over all lives of both services. So a
+//! navigator that was not running meanwhile finds out as well. This file only compares and
+//! converts.
 
 use lager_topics::NavigatorStatus;
 
 use crate::odometer::STANDARD_DUTY;
 
-/// The bridge's sum, now and when the robot's place was last known; in duty × µs of both motors.
+/// The bridge's sum, now and when the robot's place was last known, in duty × µs of both motors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ByHand {
     here: Option<u64>,
@@ -15,7 +16,7 @@ pub(crate) struct ByHand {
 }
 
 impl ByHand {
-    /// As a predecessor left it.
+    /// As an earlier navigator left it.
     pub(crate) fn from_status(sum: u64) -> Self {
         let here = Some(sum).filter(|sum| *sum != NavigatorStatus::NEVER_HEARD);
         Self {
@@ -36,8 +37,8 @@ impl ByHand {
         }
     }
 
-    /// Takes the bridge's sum, and returns how far the wheels have moved since the place was known,
-    /// in mm. A bridge that has forgotten its sum has stopped the robot for that.
+    /// Takes the bridge's sum. Returns how far the wheels have moved since the place was known, in
+    /// mm. A bridge that has lost its sum has stopped the robot because of that.
     pub(crate) fn take(&mut self, sum: u64, cruise_mm_per_s: f32) -> f32 {
         self.now = sum;
         let here = *self.here.get_or_insert(sum);

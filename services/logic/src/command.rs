@@ -1,7 +1,8 @@
-//! The one steering order the navigator wants to be in force, with the id that makes it execute.
+//! The one steering order that the navigator wants in force, with its id.
 //!
-//! The same id renews an order, a new id executes it. So a changed command, and one that has to be
-//! given again, gets the next id; every other order keeps its id. This file knows nothing of maps.
+//! The same id renews an order, a new id executes it. So a changed command gets the next id, and so
+//! does a command that must be executed again. Every other order keeps its id. This file knows
+//! nothing of maps.
 
 use core::time::Duration;
 
@@ -17,25 +18,25 @@ pub(crate) struct Standing {
     given_anew: bool,
     /// When it was given.
     given: Duration,
-    /// When it was given, or last seen at work in the bridge's reports.
+    /// When it was given, or when the bridge's reports last showed it at work.
     heard: Duration,
 }
 
 /// What a report says of the order in force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum News {
+pub(crate) enum Progress {
     /// The report is too early to tell.
     None,
     /// It is at work.
     AtWork,
     /// It has ended.
     Ended(Finish),
-    /// The bridge has not reported it for too long.
+    /// The bridge has not shown it for too long.
     Unheard,
 }
 
 impl Standing {
-    /// Standing still, after an order with id `last`.
+    /// The order to stand, after an order with id `last`.
     pub(crate) fn after(last: u32) -> Self {
         Self {
             id: last,
@@ -47,9 +48,9 @@ impl Standing {
         }
     }
 
-    /// An order given before a restart. A one-shot is still the same order. A setpoint may have
-    /// been followed by another one that was never published, so it is given again under an unused
-    /// number.
+    /// An order from before a restart. A one-shot is still the same order. After a setpoint the
+    /// killed navigator may have given another one that it never published, so the setpoint gets an
+    /// unused id.
     pub(crate) fn resumed(id: u32, command: Command) -> Self {
         let is_setpoint = !command.is_one_shot();
         Self {
@@ -64,12 +65,12 @@ impl Standing {
         self.id
     }
 
-    /// What is ordered.
+    /// The command.
     pub(crate) fn command(&self) -> Command {
         self.command
     }
 
-    /// Asks for the order to be executed again although it has not changed.
+    /// Has the order executed again, although it has not changed.
     pub(crate) fn give_anew(&mut self) {
         self.given_anew = true;
     }
@@ -88,7 +89,7 @@ impl Standing {
         }
     }
 
-    /// Begins to wait for reports: before now no report could show the order.
+    /// Begins to wait for reports; until now no report could show the order.
     pub(crate) fn listen_from(&mut self, now: Duration) {
         self.heard = now;
     }
@@ -104,29 +105,29 @@ impl Standing {
         now: Duration,
         report: &SteeringReport,
         patience: Duration,
-    ) -> News {
+    ) -> Progress {
         self.outnumber(report.finished_id, report.finished_origin == Origin::Logic);
         self.outnumber(report.current_id, report.current_origin == Origin::Logic);
         if report.finished_origin == Origin::Logic && report.finished_id == self.id {
             return match report.finish.get() {
-                Some(Finish::None) | None => News::None,
-                Some(finish) => News::Ended(finish),
+                Some(Finish::None) | None => Progress::None,
+                Some(finish) => Progress::Ended(finish),
             };
         }
         let at_work = report.current_origin == Origin::Logic && report.current_id == self.id;
         let operator_has_the_arm = self.arm_granted && report.current_origin == Origin::Operator;
         if at_work || operator_has_the_arm {
             self.heard = now;
-            return News::AtWork;
+            return Progress::AtWork;
         }
         if now.saturating_sub(self.heard) > patience {
-            News::Unheard
+            Progress::Unheard
         } else {
-            News::None
+            Progress::None
         }
     }
 
-    /// Ids of an earlier life of logic that left no status must not be used again.
+    /// An earlier navigator that left no status may have used ids; these are not used again.
     fn outnumber(&mut self, id: u32, ours: bool) {
         let ahead = id.wrapping_sub(self.id);
         if ours && ahead != 0 && ahead < u32::MAX / 2 {
@@ -135,7 +136,7 @@ impl Standing {
         }
     }
 
-    /// The order as it goes onto the bus.
+    /// The order in its published form.
     pub(crate) fn order(&self) -> SteeringOrder {
         SteeringOrder {
             id: self.id,
@@ -147,7 +148,7 @@ impl Standing {
     }
 }
 
-/// Ids go round and leave out 0, which means "none".
+/// Ids wrap round and leave out 0, which means "none".
 fn next(id: u32) -> u32 {
     id.wrapping_add(1).max(1)
 }
@@ -207,10 +208,10 @@ mod tests {
         let mut news = |current, finished, finish| {
             standing.news(Duration::ZERO, &report(current, finished, finish), PATIENCE)
         };
-        assert_eq!(news(4, 3, Finish::Done), News::None);
-        assert_eq!(news(5, 4, Finish::Aborted), News::AtWork);
-        assert_eq!(news(5, 5, Finish::None), News::None);
-        assert_eq!(news(5, 5, Finish::Done), News::Ended(Finish::Done));
+        assert_eq!(news(4, 3, Finish::Done), Progress::None);
+        assert_eq!(news(5, 4, Finish::Aborted), Progress::AtWork);
+        assert_eq!(news(5, 5, Finish::None), Progress::None);
+        assert_eq!(news(5, 5, Finish::Done), Progress::Ended(Finish::Done));
     }
 
     #[test]
@@ -221,10 +222,10 @@ mod tests {
             let report = report(current, 0, Finish::None);
             standing.news(Duration::from_millis(ms), &report, PATIENCE)
         };
-        assert_eq!(at(1250, 4), News::None);
-        assert_eq!(at(1260, 5), News::AtWork);
-        assert_eq!(at(1550, 4), News::None);
-        assert_eq!(at(1561, 4), News::Unheard);
+        assert_eq!(at(1250, 4), Progress::None);
+        assert_eq!(at(1260, 5), Progress::AtWork);
+        assert_eq!(at(1550, 4), Progress::None);
+        assert_eq!(at(1561, 4), Progress::Unheard);
     }
 
     #[test]

@@ -2,14 +2,14 @@
 
 use core::time::Duration;
 
-use lager_ports::Policy;
-use lager_topics::Pick;
+use lager_orders::Pick;
+use lager_wake::Policy;
 use lager_wire::ArmProfile;
 use serde::{Deserialize, Serialize};
 
-/// What logic has to know of the robot and how much it forgives. Times are robot time.
+/// The robot's measures, and the navigator's tolerances. Times are robot time.
 ///
-/// In JSON, as recordings have it, it is without what only [`crate::run`] heeds.
+/// Recordings have it in JSON, without the values that only [`crate::run`] uses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogicConfig {
@@ -21,106 +21,109 @@ pub struct LogicConfig {
     pub sensor_ahead_mm: f32,
     /// Width of the tape (E1), in mm.
     pub tape_mm: f32,
-    /// Way the robot rolls on after it is told to stop, in mm.
+    /// How far the robot rolls on after the command to stop, in mm.
     pub coast_mm: f32,
     /// Part of an edge by which dead reckoning may be wrong when a mark is judged.
     pub tolerance: f32,
     /// The same for a mark that a killed navigator had only begun to see.
     pub tolerance_cut_short: f32,
-    /// Part of an edge after which a node that did not come is missing (AMB-49).
+    /// How far, as a part of an edge, the robot drives before a node counts as missing (AMB-49).
     pub overdue: f32,
-    /// How far before a node the sensors must be at the start of a drive for its mark to be
-    /// waited for, in mm. Nearer, the robot may not be straight on the line when the mark comes.
+    /// How far before a node the sensors must be at the start of a drive, in mm, if the navigator
+    /// waits for the node's mark. Nearer than that, the robot may not be straight on the line when
+    /// the mark comes.
     pub run_up_mm: f32,
-    /// Way driven without seeing the line after which it is lost (AMB-49), in mm.
+    /// How far the robot drives without seeing the line before the line counts as lost (AMB-49), in
+    /// mm.
     pub line_lost_mm: f32,
-    /// How far behind a mark to both sides the line must end for the mark to be the cross bar of
-    /// the delivery, in mm.
+    /// If the line ends within this distance behind a mark to both sides, in mm, the mark is the
+    /// cross bar of the delivery.
     pub bar_end_mm: f32,
     /// How far to back away from delivered goods before turning round, in mm. The sensors must
-    /// come clear of the cross bar, or the turn would end on it.
+    /// leave the cross bar, or the turn would end on it.
     pub back_off_mm: f32,
-    /// Longest way out to the place of delivery that is believed, in mm.
+    /// Longest possible way out to the place of delivery, in mm.
     pub longest_exit_mm: f32,
-    /// How far the ranger at the front sees, in cm; 0 = there is none, and no way is looked at.
+    /// How far the ranger at the front sees, in cm. 0 = there is no ranger, and the robot looks
+    /// along no way.
     pub ranger_cm: u8,
     /// How far the ranger is ahead of the wheels' axle, in mm.
     pub ranger_ahead_mm: f32,
-    /// By how much nearer than it can see, and than the next node, a thing must be to block a way,
-    /// in cm (AMB-48).
+    /// A thing blocks a way if it is nearer than the ranger's limit, and than the next node, by at
+    /// least this, in cm (AMB-48).
     pub ranger_margin_cm: u8,
-    /// Distance of a thing between two nodes at which the robot stops before it, in cm: it must be
-    /// able to turn round there.
+    /// The robot stops at this distance before a thing between two nodes, in cm: it must be able to
+    /// turn round there.
     pub halt_cm: u8,
-    /// Distance of a thing at a node, in cm, from which there is room to turn: the body's front
-    /// corners reach 192 mm from the axle, and a ranger may tell 13 cm where 10 are left.
+    /// If a thing at a node is farther away than this, in cm, there is room to turn: the body's
+    /// front corners reach 192 mm from the axle, and a ranger may say 13 cm where it is 10.
     pub turn_room_cm: u8,
-    /// How far the robot backs up for each cm that is missing, in mm; and at all, where it has not
+    /// How far the robot backs up for each missing cm, in mm; and how far at most if it has not
     /// seen what is behind it.
     pub turn_back_mm: f32,
-    /// The most that it backs up to have room to turn, in mm from the node. Its sensors still come
-    /// over the tape that it turns to.
+    /// The most that it backs up to have room to turn, in mm from the node. Its sensors still reach
+    /// the tape to which it turns.
     pub turn_room_mm: f32,
-    /// How far behind the next node a thing still blocks the way to it, in mm.
+    /// How far behind the next node a thing may stand and still block the way to it, in mm.
     pub beyond_node_mm: f32,
-    /// The greatest age of a distance when it arrives.
+    /// How old a distance may be when it arrives.
     pub ranger_lag: Duration,
     /// How long a thing between two nodes must stay to block the way.
     pub halt_patience: Duration,
-    /// After how long ways that were found blocked are tried again before a goal is called
-    /// unreachable.
+    /// After this time the robot tries blocked ways again, before it calls a goal unreachable.
     pub try_again: Duration,
     /// Who picks the goods up.
-    #[serde(with = "crate::told::named")]
+    #[serde(with = "crate::entry::named")]
     pub pick: Pick,
-    /// What the arm may do and where it is carried (`[arm]`).
+    /// The arm's limits, and its pose for carrying (`[arm]`).
     pub arm: ArmProfile,
     /// How far a joint may be from the carry pose while the robot drives with goods, in servo
     /// units of 0.29 degrees.
     pub carry_tolerance: u16,
-    /// Where the shoulder's servo is when the claw is around goods that stand as they should in
+    /// The shoulder servo's position when the claw is around goods that stand as they should in
     /// front of the robot, in servo units.
     pub reach_shoulder: u16,
-    /// The elbow's servo for that.
+    /// The elbow servo's position for that.
     pub reach_elbow: u16,
-    /// How long goods must have been in the claw for the grip to be believed.
+    /// How long goods must have been in the claw before the grip counts as firm.
     pub grip_proof: Duration,
-    /// How far the claw must be kept from closing to be holding something, in servo units.
+    /// How far open the claw must stay to be holding something, in servo units.
     pub held_margin: u16,
     /// Battery, in tenths of a volt, below which the robot stands at the next node; 0 = none.
     pub low_battery_decivolts: u8,
     /// How much the battery must be above that to count as charged again, in tenths of a volt.
     pub charged_by_decivolts: u8,
-    /// For how long the battery must be low, or charged, to be believed.
+    /// How long the battery must be low, or charged, before that counts.
     pub battery_steady: Duration,
-    /// How long to drive on without a line frame.
+    /// How long the robot drives on without a line frame.
     pub blind_after: Duration,
-    /// How long to drive on without a report of the steering board.
+    /// How long the robot drives on without a report of the steering board.
     pub unheard_board: Duration,
-    /// How long the robot stands before an interrupted turn or drop is judged or begun.
+    /// How long the robot stands before it judges an interrupted turn or drop, or begins one.
     pub settle: Duration,
-    /// How long a setpoint may be missing in the bridge's reports before it is given again.
+    /// How long a setpoint may be missing in the bridge's reports before the navigator gives it
+    /// again.
     pub unheard_setpoint: Duration,
     /// The same for a turn or a drop.
     pub unheard_one_shot: Duration,
-    /// What the robot still moved, on average, between the last status of a killed navigator and
-    /// the end of its order's lease.
+    /// How far the robot still moved, on average, after the last status of a killed navigator,
+    /// until its order's lease ended.
     pub outage: Duration,
-    /// How often an order is given anew that the board does not carry out, before the robot gives
-    /// up.
+    /// How often the navigator gives an order again that the board does not carry out, before it
+    /// gives up.
     pub tries: u8,
-    /// How often the pick station may be passed without being found.
+    /// How often the robot may pass the pick station without finding it.
     pub misses: u8,
     /// How [`crate::run`] waits for samples.
     #[serde(skip)]
     pub waiting: Policy,
-    /// Whether [`crate::run`] takes up the state of its predecessor.
+    /// Whether [`crate::run`] resumes from the state of an earlier logic.
     #[serde(skip)]
     pub resume: bool,
 }
 
 impl LogicConfig {
-    /// How far the axle must be from a crossing tape, in mm, for a turn not to end on it.
+    /// How far the axle must be from a crossing tape, in mm, so that a turn does not end on it.
     pub(crate) fn nearest_turn_mm(&self) -> f32 {
         self.sensor_ahead_mm + self.tape_mm / 2.0
     }

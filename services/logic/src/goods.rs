@@ -1,5 +1,5 @@
-//! The goods that are not in their place: an order for them would strand the robot at an empty
-//! shelf.
+//! The goods that are not in their place. For an order of such goods the robot would drive to an
+//! empty shelf.
 //!
 //! ```text
 //!   in its place ── picked up ──> PickedUp ── delivered ──> Delivered
@@ -7,7 +7,8 @@
 //!     └──── a person says so, or describes another place <──────┘
 //! ```
 //!
-//! It only remembers them. The mission sees when one goes, and refuses what is ordered in vain.
+//! This file only remembers them. The mission notices when goods leave their place, and refuses an
+//! order for them.
 
 use core::time::Duration;
 
@@ -15,18 +16,18 @@ use lager_topics::{FailureKind, GoneGoods, GoneWhy, OrderQueue};
 
 use crate::map::Map;
 
-/// Goods that are remembered, at most. When more are gone, those gone for longest are forgotten,
-/// and fetching them in vain makes them known again.
+/// How many goods are remembered. When more are gone, those that are gone for the longest time are
+/// forgotten; the robot finds out again when it tries to fetch them.
 const MOST: usize = 96;
 
-/// Those that are known not to be in their place.
+/// The goods that are not in their place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gone {
     list: heapless::Vec<GoneGoods, MOST>,
 }
 
 impl Gone {
-    /// These goods are gone, for this reason from now on.
+    /// These goods are gone from now on, for this reason.
     pub(crate) fn add(&mut self, product: i32, why: GoneWhy, now: Duration) {
         self.remove(product);
         if self.list.is_full() {
@@ -41,22 +42,22 @@ impl Gone {
         });
     }
 
-    /// They are in their place again. Whether they were gone.
+    /// They are in their place again. Returns whether they were gone.
     pub(crate) fn remove(&mut self, product: i32) -> bool {
         let before = self.list.len();
         self.list.retain(|gone| gone.product != product);
         self.list.len() < before
     }
 
-    /// All are in their places again. Whether any were gone.
+    /// All are in their places again. Returns whether any were gone.
     pub(crate) fn clear(&mut self) -> bool {
         let had_some = !self.list.is_empty();
         self.list.clear();
         had_some
     }
 
-    /// A person has described the floor anew: goods whose place is another one now, or is not on
-    /// it any more, are where he says. Whether that changes anything.
+    /// A person has described the floor again. Goods that have another place now, or are not on the
+    /// floor any more, are where the person says. Returns whether that changes anything.
     pub(crate) fn follow(&mut self, before: &Map, now: &Map) -> bool {
         let known = self.list.len();
         self.list
@@ -64,7 +65,7 @@ impl Gone {
         self.list.len() < known
     }
 
-    /// Why an order for `product` would be in vain, with what the reason's values mean.
+    /// Why an order for `product` would be in vain, with the reason's values.
     pub(crate) fn why(&self, product: i32, now: Duration) -> Option<(FailureKind, i32)> {
         let gone = self.list.iter().find(|gone| gone.product == product)?;
         let ago = seconds(now).saturating_sub(gone.since_s);
@@ -75,13 +76,13 @@ impl Gone {
         Some((kind, i32::try_from(ago).unwrap_or(i32::MAX)))
     }
 
-    /// Puts them into what is published.
+    /// Writes them into a published state.
     pub(crate) fn fill(&self, queue: &mut OrderQueue) {
         queue.gone_count = self.list.len() as u8;
         queue.gone[..self.list.len()].copy_from_slice(&self.list);
     }
 
-    /// As a predecessor published them.
+    /// The goods that an earlier navigator published.
     pub(crate) fn from_payload(queue: &OrderQueue) -> Self {
         Self {
             list: queue.gone().iter().copied().take(MOST).collect(),

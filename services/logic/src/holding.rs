@@ -1,6 +1,6 @@
-//! Why the robot stands although its phase would turn the wheels: the steering board is unheard,
-//! the arm is not in the carry pose, the battery is low, the external computer is out of reach, or
-//! no line frames come.
+//! Why the robot stands although its phase would turn the wheels: the steering board does not
+//! report, the arm is not in the carry pose, the battery is low, the external computer is out of
+//! reach, or no line frames come.
 //!
 //! ```text
 //!   no report for 200 ms ------> Unheard ---- a report; a turn that was under way is judged --->
@@ -10,12 +10,12 @@
 //!   no line frame for 120 ms --> Blind ------ a line frame ----------------------------------->
 //! ```
 //!
-//! At home battery and link keep it once an order waits.
+//! At the delivery corner, a low battery or a lost link holds the robot only if an order waits.
 //!
-//! It is apart from the phases because any of them can be held, and goes on where it was. Without
-//! reports the robot stands because every limit counts the odometer's millimetres. A hold never
-//! begins in the middle of anything but a lost report or frame: the others wait until the robot
-//! stands anyway, or is at a node.
+//! This file stands apart from the phases because it can interrupt any of them, and the phase then
+//! goes on where it was. Without reports the robot stands because every limit counts the odometer's
+//! millimetres. Only a missing report or frame can hold the robot in the middle of a drive. The
+//! other reasons wait until the robot stands anyway, or is at a node.
 
 use core::time::Duration;
 
@@ -25,10 +25,11 @@ use crate::arm::ArmSeen;
 use crate::config::LogicConfig;
 use crate::output::Output;
 
-/// What keeps the robot standing, but for battery and link, which are the mission's.
+/// The reasons to stand, without battery and link; those are the mission's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Holding {
-    /// When the steering board last reported; before its first report, when it was first missed.
+    /// When the steering board last reported. Before its first report: when the first one was
+    /// missing.
     heard: Option<Duration>,
     /// No report for too long: stand until one comes.
     pub(crate) unheard: bool,
@@ -39,14 +40,13 @@ pub(crate) struct Holding {
 }
 
 impl Holding {
-    /// The robot stands anyway, and what it is about to do is another matter.
+    /// The robot stands anyway, so the arm counts as for any later move.
     pub(crate) fn forget(&mut self) {
         self.blind = false;
         self.joint_off = None;
     }
 
-    /// Stands when the steering board has not reported for too long. Returns whether that begins
-    /// now.
+    /// Stands if the steering board has not reported for too long. Returns whether that begins now.
     pub(crate) fn watch_board(&mut self, now: Duration, config: &LogicConfig) -> bool {
         let heard = *self.heard.get_or_insert(now);
         if self.unheard || now.saturating_sub(heard) <= config.unheard_board {
@@ -56,14 +56,14 @@ impl Holding {
         true
     }
 
-    /// The steering board has reported just now. Whether it was unheard before.
+    /// The steering board has just reported. Returns whether it was silent before.
     pub(crate) fn hear_board(&mut self, now: Duration) -> bool {
         self.heard = Some(now);
         core::mem::take(&mut self.unheard)
     }
 
-    /// Lets the wheels turn with goods only when the arm is where it is carried. To be asked
-    /// whenever the robot stands.
+    /// Lets the wheels turn with goods only if the arm is in its carry pose. Call it whenever the
+    /// robot stands.
     pub(crate) fn watch_arm(&mut self, arm: &ArmSeen, config: &LogicConfig, out: &mut Output) {
         let off = arm.joint_off(config.arm.carry, config.carry_tolerance);
         let before = core::mem::replace(&mut self.joint_off, off.map(|(joint, ..)| joint));

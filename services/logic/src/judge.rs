@@ -1,5 +1,5 @@
-//! What a mark is: a pick station, the next node, or neither. The map says what may come, dead
-//! reckoning says about where.
+//! Decides what a mark means: a pick station, the next node, or neither. The map says which marks
+//! may come, and dead reckoning says about where they are.
 //!
 //! ```text
 //!   A ----------------|s------------------ B
@@ -8,14 +8,14 @@
 //! ```
 //!
 //! One mark looks like another (AMB-18: a border crossing is a one-sided mark). A mark that is
-//! neither expected nor plausible is ignored: the caller says so and drives on.
+//! neither expected nor plausible is ignored; the caller reports it and drives on.
 
 use crate::marks::Sides;
 
-/// What the map promises on the edge being driven along, as seen in driving direction.
+/// What the map has on the present edge, seen in driving direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
-    /// From node to node, in mm.
+pub struct EdgeMarks {
+    /// Length from node to node, in mm.
     pub length_mm: f32,
     /// Sides with a pick station at the middle.
     pub stations: Sides,
@@ -23,20 +23,20 @@ pub struct Edge {
     pub crossing: Sides,
 }
 
-/// What a mark was.
+/// What a mark is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The pick station at the middle of the edge.
     Station,
     /// The node at the end of the edge.
     Node,
-    /// Nothing that is on the map.
+    /// Not on the map.
     Unexpected,
 }
 
-/// Judges a mark that was seen `at_mm` behind the last node, where dead reckoning may be wrong by
-/// `tolerance` of the edge.
-pub fn judge(edge: &Edge, sides: Sides, at_mm: f32, tolerance: f32) -> Verdict {
+/// Judges a mark that was seen `at_mm` behind the last node. Dead reckoning may be wrong by
+/// `tolerance`, as a part of the edge.
+pub fn judge(edge: &EdgeMarks, sides: Sides, at_mm: f32, tolerance: f32) -> Verdict {
     let near = |middle: f32| (at_mm / edge.length_mm - middle).abs() <= tolerance;
     let past_stations = at_mm >= edge.length_mm * (1.0 - tolerance);
     if past_stations {
@@ -67,7 +67,7 @@ mod tests {
     const SIDES: [Sides; 4] = [Sides::NONE, Sides::LEFT, Sides::RIGHT, Sides::BOTH];
 
     fn check(stations: Sides, crossing: Sides, sides: Sides, at_mm: f32, expected: Verdict) {
-        let edge = Edge {
+        let edge = EdgeMarks {
             length_mm: 400.0,
             stations,
             crossing,
@@ -144,7 +144,7 @@ mod tests {
             crossing in 1usize..4,
             seen in 1usize..4,
         ) {
-            let edge = Edge { length_mm, stations: SIDES[stations], crossing: SIDES[crossing] };
+            let edge = EdgeMarks { length_mm, stations: SIDES[stations], crossing: SIDES[crossing] };
             let node = length_mm * (1.0 + error);
             prop_assert_eq!(judge(&edge, edge.crossing, node, 0.25), Verdict::Node);
             let sides = SIDES[seen];

@@ -1,22 +1,23 @@
-//! How long sensor frames take until logic has decided: what `latency/path` shows.
+//! Measures how long sensor frames take until logic has decided, for `latency/path`.
 //!
-//! It is apart from the shell because it must cost the path nothing: while frames are handled it
-//! keeps only the times that came with them, and counts them when the turn is over and its orders
-//! are out. It takes moments as arguments, reads no clock and does not allocate.
+//! It stands apart from the shell because it must cost the path nothing. While frames are handled
+//! it keeps only their times, and counts them when the turn is over and its orders have left.
+//! Moments are arguments; it reads no clock and does not allocate.
 
 use heapless::Vec;
-use lager_topics::{PathLatency, SensorDistance, SensorLine, Stamp, Topic};
+use lager_sample::{Stamp, Topic};
+use lager_topics::{PathLatency, SensorDistance, SensorLine};
 
 /// How often the counts are published, in real ns.
 const PERIOD_NS: u64 = 1_000_000_000;
 
-/// Frames that can wait for one turn: the queues of both topics.
+/// How many frames can come in one turn: the queues of both topics.
 const TURN: usize = SensorLine::QOS.buffer + SensorDistance::QOS.buffer;
 
 /// Times of one frame, in ns of `CLOCK_MONOTONIC`: read, published, received.
 type Times = [u64; 3];
 
-/// Counts the ways of frames.
+/// Measures how long frames take.
 #[derive(Debug, Default)]
 pub(crate) struct FrameMeter {
     /// The frames of the present turn.
@@ -26,23 +27,23 @@ pub(crate) struct FrameMeter {
 }
 
 impl FrameMeter {
-    /// The navigator was given a frame with this stamp, received at `received_ns`.
+    /// The navigator got a frame with this stamp, received at `received_ns`.
     pub(crate) fn took(&mut self, stamp: &Stamp, received_ns: u64) {
         let way = [stamp.source_time_ns, stamp.publish_time_ns, received_ns];
-        // Only if frames come in while more than a queue of them is handled: those before this one
-        // were decided upon by the time it was received.
+        // This happens only if frames come in while more than a queue of them is handled. The
+        // earlier frames were decided by the time when this one was received.
         if self.taken.is_full() {
             self.turn_over(received_ns);
         }
         let _ = self.taken.push(way);
     }
 
-    /// The turn is over and everything that follows from its frames is sent.
+    /// The turn is over, and all its orders have left.
     pub(crate) fn turn_over(&mut self, now_ns: u64) {
         let counted = &mut self.counted;
         for [read, published, received] in &self.taken {
             let way = [*read, *published, *received, now_ns];
-            // A writer that is not ours may stamp what it likes.
+            // A writer of another program may stamp anything.
             if !way.is_sorted() {
                 continue;
             }
@@ -54,7 +55,7 @@ impl FrameMeter {
         self.taken.clear();
     }
 
-    /// What is to be published now, once a second.
+    /// The counts to publish now, once a second.
     pub(crate) fn due(&mut self, now_ns: u64) -> Option<&PathLatency> {
         if now_ns.saturating_sub(self.told_ns) < PERIOD_NS {
             return None;

@@ -11,148 +11,80 @@
 //!      0    1    2   x    `=` is the way out at delivery corner (0, 0): outwards along x
 //! ```
 //!
-//! It is what was published and never changes: what blocks a way stands in [`crate::blocks`]. It
-//! never plans and never knows where the robot is.
+//! It is the published map and never changes: [`crate::blocks`] has what blocks a way. It never
+//! plans and never knows where the robot is.
 
-use lager_topics::{Failure, FailureKind, Heading, Side, WarehouseMap};
+use lager_floor::{
+    Edge, FloorError, Grid, Heading, MAX_PRODUCTS, MAX_SQUARES, Node, Product, SideLength,
+};
+use lager_topics::{Failure, FailureKind, WarehouseMap};
 
-use crate::heading::{Compass, HEADINGS};
-use crate::judge::Edge;
+use crate::judge::EdgeMarks;
 use crate::marks::Sides;
-use crate::node::Node;
-
-/// Most nodes along one side of a warehouse.
-pub const MAX_SIDE: usize = 100;
-
-/// Most nodes a warehouse can have.
-pub const MAX_NODES: usize = MAX_SIDE * MAX_SIDE;
-
-/// Most pick stations; a published map holds as many.
-pub const MAX_STATIONS: usize = 256;
-
-/// Shortest side of a square in cm. A mark at the middle of an edge must come under the sensors
-/// after the axle has passed the node before it.
-pub const MIN_SIDE_CM: u16 = 40;
 
 /// A place where a product is picked: the middle of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PickStation {
     /// The product's number.
     pub product: i32,
-    /// The nodes it lies between, the one nearer to the origin first.
-    pub ends: [Node; 2],
-    /// Where the robot looks when it stands at the goods: into the product's square.
+    /// The edge on which it lies.
+    pub edge: Edge,
+    /// Which way the robot looks when it stands at the goods: into the product's square.
     pub into: Heading,
 }
 
 impl PickStation {
-    /// The heading along the station's edge from one of its ends, `None` elsewhere.
-    pub fn heading_from(&self, node: Node) -> Option<Heading> {
-        let other = self.other_end(node)?;
-        HEADINGS
-            .into_iter()
-            .find(|heading| heading.step_from(node) == Some(other))
-    }
-
-    /// On which side its mark is for one who drives along `heading`.
+    /// On which side its mark is, for a robot that drives along `heading`.
     pub fn side_for(&self, heading: Heading) -> Sides {
         Sides {
             left: self.into == heading.left(),
             right: self.into == heading.right(),
         }
     }
+}
 
-    /// The end that is not `node`, `None` if `node` is no end.
-    pub fn other_end(&self, node: Node) -> Option<Node> {
-        match self.ends {
-            [first, second] if first == node => Some(second),
-            [first, second] if second == node => Some(first),
-            _ => None,
+impl From<&Product> for PickStation {
+    fn from(product: &Product) -> Self {
+        Self {
+            product: product.id.get(),
+            edge: product.edge(),
+            into: product.side.back(),
         }
     }
 }
 
-/// The warehouse, ready to be driven in.
+/// The warehouse in a form for driving.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    width: u8,
-    height: u8,
+    /// Its nodes and its way out.
+    pub grid: Grid,
     side_mm: f32,
-    delivery: Node,
-    stations: heapless::Vec<PickStation, MAX_STATIONS>,
+    stations: heapless::Vec<PickStation, MAX_PRODUCTS>,
 }
 
 impl Map {
-    /// The map as published.
+    /// Reads a published map.
     ///
     /// # Errors
     /// The published map is incomplete or contradicts itself.
     pub fn new(published: &WarehouseMap) -> Result<Self, Failure> {
-        let refuse = |kind, expected, seen| Err(Failure::new(kind, (0, 0), expected, seen));
-        let WarehouseMap { width, height, .. } = *published;
-        if width == 0 || height == 0 {
-            return refuse(FailureKind::MapEmpty, 1, 0);
+        let grid = published.grid().map_err(failure)?;
+        let count = usize::from(published.product_count);
+        if count > MAX_PRODUCTS {
+            return Err(failure(FloorError::TooManyProducts { count }));
         }
-        let crossings = usize::from(width.max(height)) + 1;
-        if crossings > MAX_SIDE {
-            return refuse(FailureKind::MapTooLarge, MAX_SIDE as i32, crossings as i32);
-        }
-        if usize::from(published.product_count) > MAX_STATIONS {
-            return refuse(
-                FailureKind::TooManyProducts,
-                MAX_STATIONS as i32,
-                published.product_count.into(),
-            );
-        }
-        let delivery = Node::new(published.delivery_x, published.delivery_y);
-        if ![0, width].contains(&delivery.x) || ![0, height].contains(&delivery.y) {
-            let Node { x, y } = delivery;
-            return Err(Failure::new(FailureKind::DeliveryOffCorner, (x, y), 0, 0));
-        }
-        match published.side_length_cm {
-            0 => return refuse(FailureKind::SideUnknown, MIN_SIDE_CM.into(), 0),
-            short if short < MIN_SIDE_CM => {
-                return refuse(FailureKind::SideTooShort, MIN_SIDE_CM.into(), short.into());
-            }
-            _ => {}
-        }
-        let mut map = Self {
-            width,
-            height,
-            side_mm: f32::from(published.side_length_cm) * 10.0,
-            delivery,
-            stations: heapless::Vec::new(),
-        };
+        let side = SideLength::new(published.side_length_cm).map_err(failure)?;
+        let mut products = heapless::Vec::<Product, MAX_PRODUCTS>::new();
         for product in published.products() {
-            let square = Node::new(product.x, product.y);
-            let Some(station) = map.station_at(product.id, square, product.side.get()) else {
-                return refuse(FailureKind::ProductOutside, 0, product.id);
-            };
-            if map.station(product.id).is_some() {
-                return refuse(FailureKind::ProductTwice, 0, product.id);
-            }
-            // As many places as the published list has.
-            let _ = map.stations.push(station);
+            let outside = || Failure::new(FailureKind::ProductOutside, (0, 0), 0, product.id);
+            // The published list has as many places.
+            let _ = products.push(product.get().ok_or_else(outside)?);
         }
-        Ok(map)
-    }
-
-    /// The edge a side of a square is (AMB-37), seen as a pick station.
-    fn station_at(&self, product: i32, square: Node, side: Option<Side>) -> Option<PickStation> {
-        let Node { x, y } = square;
-        if x >= self.width || y >= self.height {
-            return None;
-        }
-        let (first, second, into) = match side? {
-            Side::Left => ((x, y), (x, y + 1), Heading::Right),
-            Side::Up => ((x, y + 1), (x + 1, y + 1), Heading::Down),
-            Side::Right => ((x + 1, y), (x + 1, y + 1), Heading::Left),
-            Side::Down => ((x, y), (x + 1, y), Heading::Up),
-        };
-        Some(PickStation {
-            product,
-            ends: [Node::new(first.0, first.1), Node::new(second.0, second.1)],
-            into,
+        grid.check(&products).map_err(failure)?;
+        Ok(Self {
+            grid,
+            side_mm: f32::from(side.mm()),
+            stations: products.iter().map(PickStation::from).collect(),
         })
     }
 
@@ -161,59 +93,13 @@ impl Map {
         self.side_mm
     }
 
-    /// The node at the delivery corner.
-    pub fn delivery(&self) -> Node {
-        self.delivery
-    }
-
-    /// The heading of the way that leaves the warehouse at the delivery corner.
-    pub fn exit(&self) -> Heading {
-        if self.delivery.x == 0 {
-            Heading::Left
-        } else {
-            Heading::Right
-        }
-    }
-
-    /// Squares from left to right and from bottom to top.
-    pub fn size(&self) -> [u8; 2] {
-        [self.width, self.height]
-    }
-
-    /// How many nodes there are.
-    pub fn node_count(&self) -> usize {
-        (usize::from(self.width) + 1) * (usize::from(self.height) + 1)
-    }
-
-    /// Whether there is such a node.
-    pub fn contains(&self, node: Node) -> bool {
-        node.x <= self.width && node.y <= self.height
-    }
-
-    /// A node's place in arrays, row by row. The node must be in the map.
-    pub fn index(&self, node: Node) -> usize {
-        debug_assert!(self.contains(node));
-        usize::from(node.y) * (usize::from(self.width) + 1) + usize::from(node.x)
-    }
-
-    /// The node at a place in arrays, below [`Self::node_count`].
-    pub fn node(&self, index: usize) -> Node {
-        let columns = usize::from(self.width) + 1;
-        // Both are at most 255 because width and height are bytes.
-        Node::new((index % columns) as u8, (index / columns) as u8)
-    }
-
-    /// The next node in a direction.
-    pub fn neighbour(&self, node: Node, heading: Heading) -> Option<Node> {
-        heading.step_from(node).filter(|next| self.contains(*next))
-    }
-
     /// Whether tape leads away from `node` along `heading`, to another node or out.
     pub fn has_tape(&self, node: Node, heading: Heading) -> bool {
-        self.neighbour(node, heading).is_some() || (node == self.delivery && heading == self.exit())
+        self.grid.neighbour(node, heading).is_some()
+            || (node == self.grid.delivery() && heading == self.grid.exit())
     }
 
-    /// On which sides tape leads away from `node`, for one who comes with `heading`.
+    /// On which sides tape leads away from `node`, for a robot that comes with `heading`.
     pub fn crossing_sides(&self, node: Node, heading: Heading) -> Sides {
         Sides {
             left: self.has_tape(node, heading.left()),
@@ -225,7 +111,7 @@ impl Map {
     pub fn station_sides(&self, node: Node, heading: Heading) -> Sides {
         let mut sides = Sides::NONE;
         for station in &self.stations {
-            if station.heading_from(node) == Some(heading) {
+            if station.edge.heading_from(node) == Some(heading) {
                 let side = station.side_for(heading);
                 sides.left |= side.left;
                 sides.right |= side.right;
@@ -234,17 +120,17 @@ impl Map {
         sides
     }
 
-    /// What lies on the edge from `node` along `heading`, if there is one.
-    pub fn edge(&self, node: Node, heading: Heading) -> Option<Edge> {
-        let end = self.neighbour(node, heading)?;
-        Some(Edge {
+    /// The marks and the length of the edge from `node` along `heading`, if there is one.
+    pub fn edge(&self, node: Node, heading: Heading) -> Option<EdgeMarks> {
+        let end = self.grid.neighbour(node, heading)?;
+        Some(EdgeMarks {
             length_mm: self.side_mm,
             stations: self.station_sides(node, heading),
             crossing: self.crossing_sides(end, heading),
         })
     }
 
-    /// Where a product is picked.
+    /// The station of a product.
     pub fn station(&self, product: i32) -> Option<&PickStation> {
         self.stations
             .iter()
@@ -253,8 +139,41 @@ impl Map {
 
     /// Whether both maps have the same tape between nodes, whatever their products.
     pub fn same_floor(&self, other: &Self) -> bool {
-        let floor = |map: &Self| (map.width, map.height, map.side_mm, map.delivery);
-        floor(self) == floor(other)
+        (self.grid, self.side_mm) == (other.grid, other.side_mm)
+    }
+}
+
+/// Why the navigator cannot drive on such a floor.
+fn failure(error: FloorError) -> Failure {
+    let refused = |kind, expected, seen| Failure::new(kind, (0, 0), expected, seen);
+    match error {
+        FloorError::Size { size } if size.x == 0 || size.y == 0 => {
+            refused(FailureKind::MapEmpty, 1, 0)
+        }
+        FloorError::Size { size } => {
+            let nodes = |squares: u8| i32::from(squares) + 1;
+            let seen = nodes(size.x.max(size.y));
+            refused(FailureKind::MapTooLarge, nodes(MAX_SQUARES), seen)
+        }
+        FloorError::Delivery { delivery, .. } => {
+            let at = (delivery.x, delivery.y);
+            Failure::new(FailureKind::DeliveryOffCorner, at, 0, 0)
+        }
+        FloorError::Side { cm: 0 } => {
+            refused(FailureKind::SideUnknown, SideLength::MIN_CM.into(), 0)
+        }
+        FloorError::Side { cm } => {
+            let nearest = cm.clamp(SideLength::MIN_CM, SideLength::MAX_CM);
+            refused(FailureKind::SideWrong, nearest.into(), cm.into())
+        }
+        FloorError::TooManyProducts { count } => refused(
+            FailureKind::TooManyProducts,
+            MAX_PRODUCTS as i32,
+            count as i32,
+        ),
+        FloorError::ProductNegative { number } => refused(FailureKind::ProductOutside, 0, number),
+        FloorError::ProductOutside { id, .. } => refused(FailureKind::ProductOutside, 0, id),
+        FloorError::ProductTwice { id, .. } => refused(FailureKind::ProductTwice, 0, id),
     }
 }
 

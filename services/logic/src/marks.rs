@@ -1,8 +1,8 @@
-//! Marks on the floor: from single line states to one mark with its sides, judged once.
+//! Marks on the floor: makes one mark with its sides out of single line states, judged once.
 //!
 //! The sensors take about 200 ms to cross a tape. At an angle, a crossing first shows one side;
-//! frames get lost; and noise shows marks that do not exist. So the sides are counted while a mark
-//! lasts, and the mark is reported when it has ended:
+//! frames get lost; and noise shows marks that do not exist. So this file counts the sides while a
+//! mark lasts, and reports the mark when it has ended:
 //!
 //! ```text
 //!  OnLine OnLine StationToLeft FourWay FourWay StationToRight OnLine
@@ -10,11 +10,11 @@
 //!                        right 1       2       3               -> Mark { both sides }
 //! ```
 //!
-//! Whether the mark means a station, a node or nothing is for [`crate::judge`] and the map.
+//! [`crate::judge`] and the map decide whether the mark means a station, a node or nothing.
 
 use lager_wire::LineState;
 
-/// Frames that must show a side before it is believed.
+/// How many frames must show a side before it counts.
 const BELIEVED: u8 = 3;
 /// Where counting stops; the status keeps two bits for each side.
 const MOST: u8 = 3;
@@ -55,7 +55,7 @@ impl Sides {
         self == Self::NONE
     }
 
-    /// Whether every side set here is set there.
+    /// Whether `other` has every side of this.
     pub fn is_within(self, other: Self) -> bool {
         (!self.left || other.left) && (!self.right || other.right)
     }
@@ -82,12 +82,12 @@ impl core::fmt::Display for Sides {
     }
 }
 
-/// A mark the sensors have left behind.
+/// A mark that the sensors have left behind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark {
-    /// Where it had tape; at least one side.
+    /// The sides with tape; at least one.
     pub sides: Sides,
-    /// No line goes on behind it.
+    /// The line does not go on behind it.
     pub line_ends: bool,
 }
 
@@ -96,12 +96,12 @@ pub struct Mark {
 pub struct MarkReader {
     left: u8,
     right: u8,
-    /// The cross bar the board still remembers has been given out.
+    /// The cross bar that the board still remembers has been reported.
     bar_told: bool,
 }
 
 impl MarkReader {
-    /// Takes one line state and gives out the mark that ended with it, if any.
+    /// Takes one line state. Returns the mark that ended with it, if any.
     pub fn push(&mut self, state: LineState) -> Option<Mark> {
         self.bar_told &= state == LineState::DropStation;
         match state {
@@ -109,8 +109,8 @@ impl MarkReader {
             LineState::StationToRight => self.count(Sides::RIGHT),
             LineState::FourWay => self.count(Sides::BOTH),
             LineState::DropStation => {
-                // The board remembers that the last tape it saw went to both sides, also when
-                // none of those frames arrived here. It goes on saying so until it sees tape.
+                // The board remembers that its last tape went to both sides, also if none of those
+                // frames arrived here. It says so until it sees tape again.
                 if self.bar_told {
                     return None;
                 }
@@ -126,8 +126,8 @@ impl MarkReader {
         None
     }
 
-    /// Takes one line state while no mark can be judged: the mark under the sensors is counted, and
-    /// ends with the first state that is pushed again.
+    /// Takes one line state while no mark can be judged. It counts the mark under the sensors, and
+    /// that mark ends with the first state of a later `push`.
     pub fn hold(&mut self, state: LineState) {
         match state {
             LineState::StationToLeft | LineState::StationToRight | LineState::FourWay => {
@@ -142,8 +142,8 @@ impl MarkReader {
         (self.left, self.right) = (0, 0);
     }
 
-    /// Believes what has been seen so far, however briefly: the rest of the mark may have passed
-    /// while no process was reading.
+    /// Takes what was seen so far as certain, however short it was: the rest of the mark may have
+    /// passed while no process was reading.
     pub fn believe(&mut self) {
         for count in [&mut self.left, &mut self.right] {
             if *count > 0 {

@@ -1,4 +1,5 @@
-//! What to do next: orders, the goal, the decision at each node, and what becomes of a failure.
+//! Decides what the robot does next: orders, the goal, the way at each node, and how it goes on
+//! after a failure.
 //!
 //! ```text
 //!                       map                order
@@ -19,7 +20,7 @@
 //!   a restart with no state to take up -> Lost; only a reset leads out
 //! ```
 //!
-//! Each phase has its manoeuvre (`manoeuvre/mod.rs`), and the manoeuvre's [`Outcome`] leads to the
+//! Each phase has its manoeuvre (`manoeuvre/mod.rs`), and the manoeuvre's [`Ending`] leads to the
 //! next phase ([`Mission::next`]). The mission knows nothing of manoeuvres, lines, marks or the
 //! odometer.
 
@@ -28,68 +29,68 @@ mod ways;
 
 use core::time::Duration;
 
+use lager_floor::{Heading, Node, Spin};
+use lager_orders::Pick;
 use lager_topics::{
-    EventKind, Failure, FailureKind, Goal, GoneWhy, Heading, Order, Phase, Pick, Route, Thought,
-    ThoughtKind, WarehouseMap,
+    EventKind, Failure, FailureKind, Goal, GoneWhy, Order, Phase, Route, Thought, ThoughtKind,
+    WarehouseMap,
 };
 
 use crate::battery::Battery;
+use crate::belief::Belief;
 use crate::blocks::Blocks;
 use crate::config::LogicConfig;
+use crate::ending::Ending;
 use crate::goods::Gone;
-use crate::heading::{Compass, Spin};
 use crate::map::{Map, PickStation};
 use crate::marks::Sides;
-use crate::node::Node;
-use crate::outcome::Outcome;
 use crate::output::Output;
-use crate::place::Place;
 use crate::queue::Queue;
 use crate::route::Distances;
 
-/// What is large: allocated once, when the navigator is made.
+/// The large parts, allocated once when the navigator is made.
 #[derive(Clone, Debug, Default)]
 struct Tables {
     blocks: Blocks,
     distances: Distances,
 }
 
-/// What the robot is for at the moment, and where it is.
+/// What the robot does at the moment, and where it is.
 #[derive(Clone, Debug)]
 pub(crate) struct Mission {
     config: LogicConfig,
     pub(crate) now: Duration,
     pub(crate) map: Option<Map>,
-    /// Squares of the floor that a predecessor's blocks are of.
-    blocked_floor: [u8; 2],
-    /// What was published last, and is known or was refused.
+    /// The size of the floor to which an earlier navigator's blocks belong, in squares.
+    blocked_floor: Node,
+    /// The last published map, which is known or was refused.
     published: WarehouseMap,
     tables: Box<Tables>,
-    pub(crate) place: Place,
+    pub(crate) place: Belief,
     pub(crate) phase: Phase,
-    /// Where it turns to; where it looks while it does not turn.
+    /// The heading to which it turns; if it does not turn, the heading that it has.
     pub(crate) target: Heading,
     pub(crate) goal: Goal,
-    /// The order it is on; after the delivery still the last one.
+    /// The present order; after the delivery still the last one.
     pub(crate) order: Order,
     /// The orders that wait.
     pub(crate) queue: Queue,
-    /// The goods that no order can be for.
+    /// The goods that nobody can order.
     gone: Gone,
-    /// Blocks and queue, by their revisions, with which no waiting order could be begun.
+    /// The revisions of blocks and queue with which no waiting order could begin.
     none_reachable: Option<(u32, u32)>,
     pub(crate) delivered: u32,
     pub(crate) misses: u8,
-    /// How often the ways that were found blocked have been tried again for the goal.
+    /// How often the blocked ways were tried again for the present goal.
     tries: u8,
-    /// The operator was believed although the claw does not feel the goods.
+    /// The operator insisted that the claw holds the goods, although it does not feel them.
     pub(crate) forced: bool,
     /// Who picks the goods up.
     pub(crate) pick: Pick,
     pub(crate) battery: Battery,
-    /// It is to do nothing without the external computer, which is out of reach.
+    /// It must do nothing without the external computer, which is out of reach.
     pub(crate) link_lost: bool,
-    /// It stands at the node because of either.
+    /// It stands at the node because of the battery or the link.
     pub(crate) parked: bool,
     /// Why it cannot go on.
     pub(crate) failure: Failure,
@@ -99,13 +100,13 @@ pub(crate) struct Mission {
 impl Mission {
     /// A mission that waits for its map.
     pub(crate) fn new(config: LogicConfig) -> Self {
-        let place = Place::default();
+        let place = Belief::default();
         Self {
             pick: config.pick,
             config,
             now: Duration::ZERO,
             map: None,
-            blocked_floor: [0; 2],
+            blocked_floor: Node::default(),
             published: WarehouseMap::default(),
             tables: Box::default(),
             target: place.heading,
@@ -128,26 +129,26 @@ impl Mission {
         }
     }
 
-    /// The robot's place was not kept.
+    /// No earlier navigator has left the robot's place, so it is unknown.
     pub(crate) fn lose_place(&mut self) {
         self.phase = Phase::Lost;
         self.failure = self.failure_here(FailureKind::StateLost, 0, 0);
     }
 
-    /// Whether the robot is anywhere in particular.
+    /// Whether the robot's place is known.
     pub(crate) fn has_a_place(&self) -> bool {
         self.phase != Phase::WaitingForMap && !self.needs_reset()
     }
 
-    /// Whether only a person who puts the robot down leads on.
+    /// Whether only a person who puts the robot down can help.
     pub(crate) fn needs_reset(&self) -> bool {
         self.phase.needs_reset() && !self.waits_for_way()
     }
 
-    /// Which way a half turn goes: at a node where the first quarter meets tape too, between nodes
-    /// where no station's mark ends it askew.
+    /// Which way a half turn goes: at a node the way on which the first quarter meets tape, too;
+    /// between nodes the way on which no station's mark ends it too early.
     pub(crate) fn half_turn(&self) -> Spin {
-        let Place { node, heading, .. } = self.place;
+        let Belief { node, heading, .. } = self.place;
         if self.phase == Phase::TurningBack {
             let marks = self
                 .map
@@ -171,11 +172,11 @@ impl Mission {
         }
     }
 
-    /// What follows from a manoeuvre's end.
-    pub(crate) fn next(&mut self, outcome: Outcome, out: &mut Output) {
+    /// Decides what follows after a manoeuvre's end.
+    pub(crate) fn next(&mut self, outcome: Ending, out: &mut Output) {
         match (self.phase, outcome) {
-            // The robot stands where it should; a person's hand helps it.
-            (Phase::Picking, Outcome::Failed(kind, expected, seen))
+            // The robot stands where it should, and a person's hand can help it.
+            (Phase::Picking, Ending::Failed(kind, expected, seen))
                 if kind != FailureKind::DrivenByHand =>
             {
                 if kind == FailureKind::GoodsMissing {
@@ -183,7 +184,7 @@ impl Mission {
                 }
                 self.wait_for_hand(kind, expected.round() as i32, seen.round() as i32, out);
             }
-            (_, Outcome::Failed(kind, expected, seen)) => {
+            (_, Ending::Failed(kind, expected, seen)) => {
                 self.get_stuck(kind, expected.round() as i32, seen.round() as i32, out);
             }
             (Phase::Picking, _) => {
@@ -193,13 +194,13 @@ impl Mission {
                 self.doubt_turn(outcome, false, out);
                 self.set_out(out);
             }
-            (Phase::Looking, Outcome::Blocked) => {
+            (Phase::Looking, Ending::Blocked) => {
                 self.block_ahead(out);
                 self.set_out(out);
             }
             (Phase::Looking, _) => self.set_out_along(Some(self.place.heading), out),
-            (Phase::Driving | Phase::Approaching, Outcome::Blocked) => self.phase = Phase::Halted,
-            (Phase::Halted, Outcome::Blocked) => {
+            (Phase::Driving | Phase::Approaching, Ending::Blocked) => self.phase = Phase::Halted,
+            (Phase::Halted, Ending::Blocked) => {
                 self.block_ahead(out);
                 self.target = self.place.heading.back();
                 self.phase = Phase::TurningBack;
@@ -212,24 +213,24 @@ impl Mission {
                 self.doubt_turn(outcome, true, out);
                 self.phase = Phase::Driving;
             }
-            (Phase::Approaching, Outcome::Missed) => self.miss_station(out),
+            (Phase::Approaching, Ending::Missed) => self.miss_station(out),
             (Phase::Approaching, _) => {
                 if let Some(station) = self.station() {
                     self.target = station.into;
                     self.phase = Phase::Positioning;
                 }
             }
-            (Phase::Positioning, Outcome::Interrupted) => {
+            (Phase::Positioning, Ending::Interrupted) => {
                 out.think(Thought {
                     heading: self.target.into(),
                     ..ThoughtKind::TurnDisturbed.into()
                 });
             }
-            // Turned in, and no mark: it is searched for.
-            (Phase::Positioning, Outcome::Missed) if self.place.heading == self.target => {
+            // It has turned in, and there is no mark: look for it.
+            (Phase::Positioning, Ending::Missed) if self.place.heading == self.target => {
                 out.think(ThoughtKind::StationPassed);
             }
-            (Phase::Positioning, Outcome::Missed) => self.go_past_station(out),
+            (Phase::Positioning, Ending::Missed) => self.go_past_station(out),
             (Phase::Positioning, _) => self.be_in_position(out),
             (Phase::Exiting, _) => {
                 self.phase = Phase::Dropping;
@@ -241,11 +242,11 @@ impl Mission {
                 self.phase = Phase::TurningRound;
             }
             (Phase::TurningRound, _) => self.phase = Phase::Returning,
-            (Phase::Returning, Outcome::Missed) if self.may_go_past_corner() => {
+            (Phase::Returning, Ending::Missed) if self.may_go_past_corner() => {
                 out.think(ThoughtKind::CornerMissed);
                 self.phase = Phase::Driving;
             }
-            (Phase::Returning, Outcome::Missed) => {
+            (Phase::Returning, Ending::Missed) => {
                 self.get_stuck(FailureKind::CornerUnseen, 0, 0, out);
             }
             (Phase::Returning, _) => {
@@ -256,17 +257,13 @@ impl Mission {
                 self.pass_node(out);
                 self.go_on_from_node(out);
             }
-            // They stand, and standing does not end.
+            // In these phases the robot stands, and standing does not end.
             (Phase::WaitingForMap | Phase::WaitingForOrder | Phase::Stuck | Phase::Lost, _) => {}
         }
     }
 
-    fn doubt_turn(&mut self, outcome: Outcome, on_edge: bool, out: &mut Output) {
-        let Some(map) = self
-            .map
-            .as_ref()
-            .filter(|_| outcome == Outcome::Interrupted)
-        else {
+    fn doubt_turn(&mut self, outcome: Ending, on_edge: bool, out: &mut Output) {
+        let Some(map) = self.map.as_ref().filter(|_| outcome == Ending::Interrupted) else {
             return;
         };
         self.place.doubt_turn(map, on_edge);
@@ -307,23 +304,23 @@ impl Mission {
         }
     }
 
-    /// On the station's edge again without having found its mark: on to the node ahead, and there
-    /// once more from that side.
+    /// The robot is on the station's edge again and has not found its mark. It goes on to the node
+    /// ahead, and tries again from that side.
     fn go_past_station(&mut self, out: &mut Output) {
         let along = Some(self.place.heading);
         let behind = |station: &PickStation| {
-            let mut ends = station.ends.into_iter();
-            ends.find(|end| station.heading_from(*end) == along)
+            let mut ends = station.edge.ends().into_iter();
+            ends.find(|end| station.edge.heading_from(*end) == along)
         };
         self.place.node = self.station().and_then(behind).unwrap_or(self.place.node);
-        self.doubt_turn(Outcome::Interrupted, true, out);
+        self.doubt_turn(Ending::Interrupted, true, out);
         if self.may_try_again(out) {
             out.think(ThoughtKind::StationMissed);
             self.phase = Phase::Driving;
         }
     }
 
-    /// Counts a miss; whether there may be another.
+    /// Counts a miss. Returns whether there may be another one.
     fn may_try_again(&mut self, out: &mut Output) -> bool {
         self.misses += 1;
         let (most, misses) = (self.config.misses.into(), self.misses.into());
@@ -333,7 +330,7 @@ impl Mission {
         self.misses < self.config.misses
     }
 
-    /// The mark under the sensors shows that the robot looks elsewhere than believed.
+    /// The mark under the sensors shows that the robot has another heading than believed.
     pub(crate) fn believe_other_place(&mut self, out: &mut Output) {
         self.target = self.place.heading;
         self.phase = Phase::Driving;
@@ -346,16 +343,16 @@ impl Mission {
         });
     }
 
-    /// Decides at a node where to go and goes there: turns first, or sets out at once.
+    /// Decides at a node where to go, and goes there: turns first, or sets out at once.
     ///
-    /// Every drive away from a node begins here, and again after each turn at it and each look
-    /// along the way that it is about to take: where that is found blocked, it is taken off the map
-    /// and the decision is made once more (L6).
+    /// Every drive away from a node begins here. It begins here again after each turn at the node
+    /// and after each look along the way: if that way is blocked, it is noted, and the decision is
+    /// made once more (L6).
     pub(crate) fn set_out(&mut self, out: &mut Output) {
         self.set_out_along(None, out);
     }
 
-    /// The same; the way along `seen_open` has just been looked at.
+    /// The same, just after a look along `seen_open` has shown an open way.
     fn set_out_along(&mut self, seen_open: Option<Heading>, out: &mut Output) {
         let next = self.plan(out);
         if self.parks(out) {
@@ -363,7 +360,7 @@ impl Mission {
         }
         let Some(map) = &self.map else { return };
         let node = self.place.node;
-        let (home, exit) = (node == map.delivery(), map.exit());
+        let (home, exit) = (node == map.grid.delivery(), map.grid.exit());
         if let Some(heading) = self.along_station() {
             return self.go_between(heading, seen_open, out);
         }
@@ -386,12 +383,12 @@ impl Mission {
         }
     }
 
-    /// Where the edge of the goods' station leads from the node, while they are the goal and it is
-    /// open.
+    /// The heading from the node along the edge of the goods' station, if the goods are the goal
+    /// and the edge is open.
     fn along_station(&self) -> Option<Heading> {
         self.station()
             .filter(|station| self.goal == Goal::Product && self.is_open(station))
-            .and_then(|station| station.heading_from(self.place.node))
+            .and_then(|station| station.edge.heading_from(self.place.node))
     }
 
     /// How to drive from the node along `heading`.
@@ -402,7 +399,7 @@ impl Mission {
         }
     }
 
-    /// Goes along `heading` towards the next node, once that way has been looked at.
+    /// Goes along `heading` towards the next node, after a look along that way.
     fn go_between(&mut self, heading: Heading, seen_open: Option<Heading>, out: &mut Output) {
         let looked = self.config.ranger_cm == 0 || seen_open == Some(heading);
         match looked || heading != self.place.heading {
@@ -411,19 +408,20 @@ impl Mission {
         }
     }
 
-    /// Whether no new way may be begun.
+    /// Whether the robot must begin no new way.
     pub(crate) fn must_park(&self) -> bool {
         self.battery.forbids() || self.link_lost
     }
 
-    /// Whether it stands where it is because no new way may be begun: at a node, or before an order
-    /// that waits.
+    /// Whether it stands because it must begin no new way: at a node, or before an order that
+    /// waits.
     pub(crate) fn is_kept(&self) -> bool {
         let has_order = self.phase == Phase::WaitingForOrder && !self.queue.waiting().is_empty();
         self.parked || has_order && self.must_park()
     }
 
-    /// Stands at the node just reached if no new way may be begun; whether it does.
+    /// Stands at the node that it has just reached if it must begin no new way. Returns whether it
+    /// does.
     fn parks(&mut self, out: &mut Output) -> bool {
         if self.must_park() {
             self.parked = true;
@@ -436,7 +434,7 @@ impl Mission {
         self.parked
     }
 
-    /// Goes into `phase` if the robot looks along `heading`, else turns there first.
+    /// Goes into `phase` if the robot looks along `heading`; otherwise turns there first.
     fn go(&mut self, heading: Heading, phase: Phase, out: &mut Output) {
         if heading != self.place.heading {
             self.phase = Phase::Turning;

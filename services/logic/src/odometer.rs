@@ -1,43 +1,40 @@
 //! Dead reckoning from the steering board's reports: how far the axle has come and how far the
 //! robot has turned.
 //!
-//! Speed is taken as proportional to duty. That is wrong by ten per cent and more. So every judged
-//! mark corrects the way and teaches how fast these wheels really are: half of what was missing on
-//! the way between two marks is taken over. A successor learns it again. Dead reckoning only fills
-//! the gap between two marks. It never extrapolates beyond the reports: without a recent report the
-//! wheels count as standing still, because a board that is silent stops by itself.
+//! It takes speed as proportional to duty, which is wrong by ten per cent and more. So every judged
+//! mark corrects the distance, and teaches how fast these wheels really are: the odometer takes
+//! over half of the error between two marks. A successor learns it again. Dead reckoning only fills
+//! the gap between two marks. It never goes beyond the reports: without a recent report the wheels
+//! count as standing still, because a board that is silent stops by itself.
 
 use core::time::Duration;
 
 use lager_topics::SteeringReport;
-use lager_wire::{Command, SteerFlags, WheelCommand};
+use lager_wire::{COMMAND_AGE, Command, SteerFlags, WheelCommand};
 
 use crate::config::LogicConfig;
 
 /// Duty at which the configured speeds hold (PWM_STANDARD).
 pub(crate) const STANDARD_DUTY: f32 = 100.0;
 
-/// How long a report is believed; the board stops by itself when its command is this old.
-const REPORT_AGE: Duration = Duration::from_millis(150);
-
-/// The odometer learns nothing from a shorter way between two marks, in mm: there the error in
-/// where a mark was seen is too large.
+/// If two marks are nearer than this, in mm, the odometer learns nothing between them: a mark's own
+/// position is not exact enough.
 const LEAST_LESSON_MM: f32 = 150.0;
-/// The part of the missing way that is taken over.
+/// The part of the error that it takes over.
 const BELIEVED: f32 = 0.5;
-/// The most that wheels are faster or slower than configured.
+/// How much faster or slower than configured wheels can be, at most.
 const MOST_FASTER: f32 = 0.3;
 
 /// Way and angle since they were last set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Odometer {
-    /// Way of the axle in mm, negative when backing.
+    /// Distance of the axle in mm, negative when backing.
     pub travelled_mm: f32,
     /// Angle turned in degrees, positive = clockwise.
     pub turned_deg: f32,
-    /// Way since the last mark, in mm, as reckoned.
+    /// Distance since the last mark, in mm, by dead reckoning.
     lesson_mm: f32,
-    /// By which part these wheels are faster than configured.
+    /// How much faster than configured these wheels are, as a part.
     faster: f32,
     mm_per_s: f32,
     deg_per_s: f32,
@@ -46,9 +43,9 @@ pub struct Odometer {
 }
 
 impl Odometer {
-    /// Goes on to `now` at the speed last reported.
+    /// Goes on to `now` at the last reported speed.
     pub fn advance(&mut self, now: Duration) {
-        let until = now.min(self.reported + REPORT_AGE);
+        let until = now.min(self.reported + COMMAND_AGE);
         let span = until.saturating_sub(self.reckoned).as_secs_f32();
         self.reckoned = now.max(self.reckoned);
         let way_mm = self.mm_per_s * span;
@@ -62,8 +59,8 @@ impl Odometer {
         self.advance(now);
         let (left, right) = speeds(report);
         let (left, right) = (left * (1.0 + self.faster), right * (1.0 + self.faster));
-        // In a turn on the spot the board makes both sides turn alike. Duties that differ then show
-        // how much the motors differ, not that the axle moves.
+        // In a turn on the spot the board makes both sides turn alike. So different duties then
+        // show how much the motors differ, not that the axle moves.
         self.mm_per_s = match left * right < 0.0 {
             true => 0.0,
             false => (left + right) / 2.0 * config.cruise_mm_per_s,
@@ -72,7 +69,7 @@ impl Odometer {
         self.reported = now;
     }
 
-    /// A mark whose place is known has shown that the way is `missing_mm` more than reckoned.
+    /// A mark with a known place shows that the distance is `missing_mm` longer than reckoned.
     pub fn correct(&mut self, missing_mm: f32) {
         self.travelled_mm += missing_mm;
         let reckoned_mm = core::mem::take(&mut self.lesson_mm);
@@ -83,18 +80,18 @@ impl Odometer {
         }
     }
 
-    /// The robot was put somewhere: what was driven since the last mark teaches nothing.
+    /// A person has moved the robot: the distance since the last mark teaches nothing.
     pub fn forget_way(&mut self) {
         self.lesson_mm = 0.0;
     }
 }
 
-/// Speed of both wheels as a share of that at the standard duty.
+/// Speed of both wheels, as a part of the speed at the standard duty.
 fn speeds(report: &SteeringReport) -> (f32, f32) {
     let flags = SteerFlags(report.flags);
-    // A board of ours locks its arm while the wheels move. A report without flags comes from an
+    // A board of ours locks its arm while the wheels move. A report without flags is that of an
     // original board, which reports nothing: the bridge fills in the command that it was sent, and
-    // its duty is the standard one.
+    // such a board uses the standard duty.
     if flags == SteerFlags::NONE && report.left_duty == 0 && report.right_duty == 0 {
         return nominal(report.code);
     }
@@ -112,7 +109,7 @@ fn speeds(report: &SteeringReport) -> (f32, f32) {
     )
 }
 
-/// The speeds a command is carried out with (W1).
+/// The speeds at which a board carries out a command (W1).
 fn nominal(code: u8) -> (f32, f32) {
     use WheelCommand::{
         ActiveBackward, ActiveForward, LeftDiag, LeftPerp, ManualBackward, ManualForward,
@@ -201,7 +198,7 @@ mod tests {
         let right = after_a_second(&report(100, 100, SteerFlags::RIGHT_REVERSE));
         assert!((right.turned_deg - 30.0).abs() < 0.1, "{right:?}");
         assert!(right.travelled_mm.abs() < 0.01, "{right:?}");
-        // Of a board that makes up for motors that differ.
+        // A report of a board that compensates for unequal motors.
         let unlike = after_a_second(&report(105, 95, SteerFlags::RIGHT_REVERSE));
         assert!(unlike.travelled_mm.abs() < 0.01, "{unlike:?}");
         let left = after_a_second(&report(100, 100, SteerFlags::LEFT_REVERSE));

@@ -1,14 +1,14 @@
-//! What the navigator has to say after an input: events, a thought, and what has changed.
+//! The navigator's answer to an input: events, a thought, and which states have changed.
 
 use lager_topics::{Event, EventKind, Failure, Order, Role, Thought, ThoughtKind};
 
-use crate::node::Node;
-use crate::place::Place;
+use crate::belief::Belief;
+use lager_floor::Node;
 
-/// What the navigator has to say after an input.
+/// The navigator's news after an input.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
-    /// What has happened on the mission, in order.
+    /// The events of the mission, in order.
     pub events: heapless::Vec<Event, 6>,
     /// Its thought; the last one if there were several.
     pub thought: Option<Thought>,
@@ -18,7 +18,7 @@ pub struct Output {
     pub blocks_changed: bool,
     /// [`Navigator::queue`](crate::Navigator::queue) has changed.
     pub queue_changed: bool,
-    /// [`Navigator::status`](crate::Navigator::status) has changed in more than what changes with
+    /// More of [`Navigator::status`](crate::Navigator::status) has changed than what changes with
     /// every frame: it has to go out at once.
     pub status_changed: bool,
 }
@@ -40,14 +40,14 @@ impl Output {
         });
     }
 
-    pub(crate) fn announce(&mut self, kind: EventKind, at: Place, order: Order) {
+    pub(crate) fn announce(&mut self, kind: EventKind, at: Belief, order: Order) {
         self.announce_failure(kind, at, order, Failure::default());
     }
 
     pub(crate) fn announce_failure(
         &mut self,
         kind: EventKind,
-        at: Place,
+        at: Belief,
         order: Order,
         failure: Failure,
     ) {
@@ -61,7 +61,7 @@ impl Output {
             failure,
         };
         self.status_changed = true;
-        // One input leads to at most five: a node, a blocked way, a failure, a refusal and a new
+        // One input causes at most five: a node, a blocked way, a failure, a refusal and a new
         // order.
         let _ = self.events.push(event);
     }

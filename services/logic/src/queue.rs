@@ -1,16 +1,16 @@
-//! The orders that wait for their turn (F3): in the order given, unless a person moves one up or
-//! takes one back.
+//! The orders that wait (F3), in the order in which they were given, unless a person moves one up
+//! or cancels one.
 //!
-//! It only keeps the orders. The mission decides whose turn it is and which station can be reached.
+//! It only keeps the orders. The mission decides which one is next and which station it can reach.
 //! An order that was under way and has to wait goes back to the first place; one place is always
-//! kept free for it.
+//! free for it.
 
 use lager_topics::{Order, OrderQueue, WaitingOrder};
 
 /// Places in the queue.
 const PLACES: usize = 32;
 
-/// Most orders that can wait when another one is given.
+/// How many orders can wait when another one comes.
 pub const MOST_ORDERS: usize = PLACES - 1;
 
 /// An order that waits.
@@ -18,7 +18,7 @@ pub const MOST_ORDERS: usize = PLACES - 1;
 pub struct Waiting {
     /// What was ordered.
     pub order: Order,
-    /// Its turn had come and there was no way.
+    /// Its turn came, but there was no way to its goods.
     pub put_off: bool,
 }
 
@@ -41,12 +41,12 @@ impl Queue {
         self.revision
     }
 
-    /// Whether an order with this number waits; 0 is no order's number.
+    /// Whether an order with this number waits. No order has the number 0.
     pub fn has(&self, id: u32) -> bool {
         self.place(id).is_some()
     }
 
-    /// Takes an order to the last place. Whether there was one.
+    /// Adds an order at the last place. Returns whether there was a place.
     pub fn push(&mut self, order: Order) -> bool {
         if self.list.len() >= MOST_ORDERS {
             return false;
@@ -55,13 +55,13 @@ impl Queue {
         true
     }
 
-    /// Takes an order that cannot be carried out now back to the first place.
+    /// Puts an order that cannot be carried out now back to the first place.
     pub fn put_back(&mut self, order: Order) {
         self.insert(0, order, true);
     }
 
     fn insert(&mut self, index: usize, order: Order, put_off: bool) {
-        // One place is kept for the order under way.
+        // One place is kept free for the present order.
         let _ = self.list.insert(index, Waiting { order, put_off });
         self.changed();
     }
@@ -79,7 +79,7 @@ impl Queue {
         self.take(self.place(id)?)
     }
 
-    /// Lets the order with this number change places with the one before it. Whether it did.
+    /// Moves the order with this number before the previous one. Returns whether it did.
     pub fn move_up(&mut self, id: u32) -> bool {
         let Some(index) = self.place(id).filter(|index| *index > 0) else {
             return false;
@@ -89,7 +89,7 @@ impl Queue {
         true
     }
 
-    /// Takes all orders out. Whether there were any.
+    /// Takes all orders out. Returns whether there were any.
     pub fn clear(&mut self) -> bool {
         let had_some = !self.list.is_empty();
         self.list.clear();
@@ -97,8 +97,8 @@ impl Queue {
         had_some
     }
 
-    /// Puts the first `count` orders off, which cannot be carried out now. Whether one of them was
-    /// not put off before.
+    /// Marks the first `count` orders as waiting for a way. Returns whether one of them was not
+    /// marked before.
     pub fn put_off(&mut self, count: usize) -> bool {
         let mut is_new = false;
         for waiting in self.list.iter_mut().take(count) {
@@ -107,7 +107,7 @@ impl Queue {
         is_new
     }
 
-    /// As they are published, with the order under way.
+    /// The published form, with the present order.
     pub fn to_payload(&self, under_way: Option<Order>) -> OrderQueue {
         let mut queue = OrderQueue {
             under_way: under_way.is_some().into(),
@@ -127,9 +127,9 @@ impl Queue {
         queue
     }
 
-    /// As a predecessor published them. It may have been killed before it published what it did
-    /// with them: `known` is the order that its status names. Any other order that was under way
-    /// then waits again.
+    /// Takes the orders that an earlier navigator published. It may have been killed before it
+    /// published a change: `known` is the order that its status names. Any other order that was
+    /// under way then waits again.
     pub fn from_payload(queue: &OrderQueue, known: Order) -> Self {
         let under_way = (queue.under_way != 0).then_some(Waiting {
             order: Order {

@@ -1,47 +1,48 @@
-//! A navigator that is told again what one was told: for `bag play --verify`.
+//! A navigator that gets recorded inputs again, for `bag play --verify`.
 //!
-//! It reads what the shell's journal has written (`nav/inputs`), and answers as the navigator and
-//! its shell did: with the same entry, and the samples that the shell published because of it. Any
-//! difference is one of the navigator. It is the same on the same kind of processor only, since the
-//! last digit of a fraction need not be the same on another one.
+//! It reads the shell's journal (`nav/inputs`), and answers as the navigator and its shell did:
+//! with the same entry, and the samples that the shell published after it. Any difference comes
+//! from the navigator. The answers are equal only on the same kind of processor, because the last
+//! digit of a fraction may differ on another one.
 
 use core::time::Duration;
 
 use lager_topics::{
-    Event, NavigatorStatus, SteeringOrder, SteeringReport, Told, ToldKind, WarehouseMap,
+    Beside, Event, NavigatorInput, NavigatorInputKind, NavigatorStatus, SteeringOrder, WarehouseMap,
 };
 
+use crate::entry::{self, Beginning};
 use crate::navigator::Navigator;
-use crate::told::{self, Beginning, Beside};
+use crate::outgoing::{Outgoing, Part};
 
-/// Why something recorded cannot be told again.
+/// Why recorded input cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
-    /// A text is not what this build writes.
+    /// A text that this build does not write.
     #[error("how a navigator began was written by another build: {0}; verify it with that build")]
     Text(#[from] serde_json::Error),
-    /// A constant that there is not, or a value that it cannot have.
+    /// There is no such constant, or it cannot have this value.
     #[error("{name}={value} is no constant of the navigator with its value: {why}")]
     Constant {
         /// The constant's name.
         name: String,
-        /// What it was to be.
+        /// The wished value.
         value: String,
         /// What is wrong.
         why: String,
     },
-    /// An entry is no input.
+    /// An entry is not an input.
     #[error(
         "an input is not one that this build knows: {0:?}; verify it with the build that wrote it"
     )]
-    Entry(Told),
+    Entry(NavigatorInput),
 }
 
-/// What a navigator did because of an input.
+/// What a navigator did after an input.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Answer {
-    /// The input as the navigator's journal writes it down, with the order in force and the proof.
-    pub told: Told,
+pub struct Replayed {
+    /// The entry as the navigator's journal writes it, with the order in force and the proof.
+    pub entry: NavigatorInput,
     /// The order that went out.
     pub command: Option<SteeringOrder>,
     /// The status that went out; the shell adds its `frames_lost`.
@@ -50,13 +51,13 @@ pub struct Answer {
     pub events: heapless::Vec<Event, 6>,
 }
 
-/// A navigator that is told again what one was told.
+/// A navigator that gets recorded inputs.
 #[derive(Debug)]
 pub struct Replay {
     navigator: Navigator,
     processor: String,
     map: Option<Box<WarehouseMap>>,
-    sent_order: Option<SteeringOrder>,
+    outgoing: Outgoing,
 }
 
 impl Replay {
@@ -78,16 +79,16 @@ impl Replay {
             navigator: beginning.navigator(),
             processor: beginning.processor,
             map: None,
-            sent_order: None,
+            outgoing: Outgoing::default(),
         })
     }
 
-    /// On what kind of processor the first one ran.
+    /// The kind of processor of the first run.
     pub fn processor(&self) -> &str {
         &self.processor
     }
 
-    /// Takes a map (`TextKind::Map`), which the next entries mean.
+    /// Takes a map (`TextKind::Map`), to which the next entries refer.
     ///
     /// # Errors
     /// Another build wrote the text.
@@ -96,53 +97,44 @@ impl Replay {
         Ok(())
     }
 
-    /// Takes an entry, with the report that it means.
+    /// Takes an entry, with the sample to which it refers.
     ///
     /// # Errors
     /// The entry makes no sense.
     pub fn handle(
         &mut self,
-        told: &Told,
-        report: Option<&SteeringReport>,
-    ) -> Result<Answer, ReplayError> {
-        let mut answer = Answer::default();
-        match told.kind.get() {
-            Some(ToldKind::Renewed) => {
-                answer.told = told::again(told.time_ns, ToldKind::Renewed);
-                answer.command = self.sent_order;
+        entry: &NavigatorInput,
+        beside: Beside<'_>,
+    ) -> Result<Replayed, ReplayError> {
+        let now = Duration::from_nanos(entry.time_ns);
+        let mut answer = Replayed::default();
+        match entry.kind.get() {
+            Some(kind @ NavigatorInputKind::Renewed) => {
+                answer.entry = entry::again(now, kind);
+                answer.command = self.outgoing.order();
             }
-            Some(ToldKind::Repeated) => {
-                answer.told = told::again(told.time_ns, ToldKind::Repeated);
+            Some(kind @ NavigatorInputKind::Repeated) => {
+                answer.entry = entry::again(now, kind);
                 answer.status = Some(self.navigator.status());
             }
-            _ => self.tell(told, report, &mut answer)?,
+            _ => {
+                let input = entry::input(entry, beside, self.map.as_deref());
+                let input = input.ok_or(ReplayError::Entry(*entry))?;
+                let output = self.navigator.handle(now, input);
+                (answer.entry, _) = entry::of_input(now, &input);
+                entry::answer(&mut answer.entry, &self.navigator, &output);
+                let order = self.navigator.current_order();
+                for part in self.outgoing.after(now, order, &output) {
+                    match part {
+                        Part::Order => answer.command = order,
+                        Part::Status => answer.status = Some(self.navigator.status()),
+                        _ => {}
+                    }
+                }
+                answer.events = output.events;
+            }
         }
         Ok(answer)
-    }
-
-    fn tell(
-        &mut self,
-        told: &Told,
-        report: Option<&SteeringReport>,
-        answer: &mut Answer,
-    ) -> Result<(), ReplayError> {
-        let beside = Beside {
-            report,
-            map: self.map.as_deref(),
-            order: &told::order_of(told),
-        };
-        let now = Duration::from_nanos(told.time_ns);
-        let input = told::input(told, &beside).ok_or(ReplayError::Entry(*told))?;
-        let output = self.navigator.handle(now, input);
-        answer.told = told::entry(now, &input);
-        told::answer(&mut answer.told, &self.navigator, &output);
-        let order = self.navigator.current_order();
-        if order != self.sent_order {
-            (self.sent_order, answer.command) = (order, order);
-        }
-        answer.status = output.status_changed.then(|| self.navigator.status());
-        answer.events = output.events;
-        Ok(())
     }
 }
 

@@ -4,19 +4,18 @@
 //! search answers both questions of the navigator: which of two nodes is nearer, and where to go
 //! from here. The result is kept until the goals, the map or the blocks change, so the robot does
 //! not search again on its way. Among equally short ways it takes the one with the fewest quarter
-//! turns, because each costs three seconds, and among those the one that goes straight on first.
+//! turns, because each costs three seconds; and among those the one that goes straight on first.
 //! Only the tables are allocated, at start-up.
 //!
-//! The search queues the nodes by their distance, so a second pass in that order knows the turns of
-//! every nearer node already: leaving `n` along `h` towards `m`, the turns to come are the fewest
-//! of `m` after arriving there along `h`.
+//! The search queues the nodes by their distance, so a second pass in that order already knows the
+//! turns of every nearer node. A robot that leaves `n` along `h` towards `m` has as many turns to
+//! come as the best way from `m` after arriving there along `h`.
 
-use lager_topics::{Heading, Route, RouteNode};
+use lager_floor::{Heading, MAX_NODES, Node, Spin};
+use lager_topics::{Route, RouteNode};
 
 use crate::blocks::Blocks;
-use crate::heading::{Compass, HEADINGS, Spin};
-use crate::map::{MAX_NODES, Map};
-use crate::node::Node;
+use crate::map::Map;
 
 /// Distance of a node from which no goal can be reached.
 const UNREACHABLE: u16 = u16::MAX;
@@ -26,8 +25,8 @@ const UNREACHABLE: u16 = u16::MAX;
 pub struct Distances {
     edges: [u16; MAX_NODES],
     queue: [Node; MAX_NODES],
-    /// For each node the quarter turns to come after leaving it along each heading, on a shortest
-    /// way; [`UNREACHABLE`] where none begins like that.
+    /// For each node and heading: how many quarter turns are to come on a shortest way that begins
+    /// along this heading; [`UNREACHABLE`] if none begins so.
     turns: [[u16; 4]; MAX_NODES],
     /// What was searched last: the goals, and the revision of the blocks.
     searched: Option<([Node; 2], u32)>,
@@ -45,7 +44,7 @@ impl Default for Distances {
 }
 
 impl Distances {
-    /// The floor is another one.
+    /// Forgets the last search, because the floor has changed.
     pub fn forget(&mut self) {
         self.searched = None;
     }
@@ -60,8 +59,8 @@ impl Distances {
         self.edges.fill(UNREACHABLE);
         let (mut queued, mut next) = (0, 0);
         for goal in goals {
-            if self.edges[map.index(goal)] != 0 {
-                self.edges[map.index(goal)] = 0;
+            if self.edges[map.grid.index(goal)] != 0 {
+                self.edges[map.grid.index(goal)] = 0;
                 self.queue[queued] = goal;
                 queued += 1;
             }
@@ -69,17 +68,18 @@ impl Distances {
         while next < queued {
             let node = self.queue[next];
             next += 1;
-            for heading in HEADINGS {
+            for heading in Heading::ALL {
                 // A way is open at both ends or at none, so searching backwards is the same.
                 let Some(neighbour) = map
+                    .grid
                     .neighbour(node, heading)
                     .filter(|_| blocks.is_open(map, node, heading))
                 else {
                     continue;
                 };
-                let place = map.index(neighbour);
+                let place = map.grid.index(neighbour);
                 if self.edges[place] == UNREACHABLE {
-                    self.edges[place] = self.edges[map.index(node)] + 1;
+                    self.edges[place] = self.edges[map.grid.index(node)] + 1;
                     self.queue[queued] = neighbour;
                     queued += 1;
                 }
@@ -87,19 +87,21 @@ impl Distances {
         }
         for index in 0..queued {
             let node = self.queue[index];
-            self.turns[map.index(node)] =
-                HEADINGS.map(|heading| self.turns_after(map, blocks, node, heading));
+            self.turns[map.grid.index(node)] =
+                Heading::ALL.map(|heading| self.turns_after(map, blocks, node, heading));
         }
     }
 
-    /// The turns to come after leaving `node` along `heading`; those of all nearer nodes are known.
+    /// The turns to come after leaving `node` along `heading`, once those of all nearer nodes are
+    /// known.
     fn turns_after(&self, map: &Map, blocks: &Blocks, node: Node, heading: Heading) -> u16 {
         let next = map
+            .grid
             .neighbour(node, heading)
             .filter(|_| blocks.is_open(map, node, heading))
-            .map(|next| map.index(next));
+            .map(|next| map.grid.index(next));
         match next {
-            Some(next) if self.edges[next] + 1 == self.edges[map.index(node)] => {
+            Some(next) if self.edges[next] + 1 == self.edges[map.grid.index(node)] => {
                 match self.edges[next] {
                     0 => 0,
                     _ => self
@@ -111,7 +113,8 @@ impl Distances {
         }
     }
 
-    /// The fewest turns to come at a node for one who faces `facing`, and where to go then.
+    /// The fewest turns to come at a node for a robot that looks along `facing`, and its next
+    /// heading.
     fn fewest(&self, place: usize, facing: Heading) -> Option<(u16, Heading)> {
         [(0, 0), (1, 1), (3, 1), (2, 2)]
             .into_iter()
@@ -125,14 +128,14 @@ impl Distances {
 
     /// Edges from `node` to the nearest goal, `None` if there is no way.
     pub fn from(&self, map: &Map, node: Node) -> Option<u16> {
-        Some(self.edges[map.index(node)]).filter(|edges| *edges != UNREACHABLE)
+        Some(self.edges[map.grid.index(node)]).filter(|edges| *edges != UNREACHABLE)
     }
 
-    /// Where to go from `node`, facing `facing`: along a shortest way, of those the one with the
-    /// fewest turns. `None` at a goal and where there is no way.
+    /// The next heading from `node` for a robot that looks along `facing`: on a shortest way, and
+    /// among those on one with the fewest turns. `None` at a goal and if there is no way.
     pub fn next(&self, map: &Map, node: Node, facing: Heading) -> Option<Heading> {
         self.from(map, node).filter(|edges| *edges > 0)?;
-        let (_, heading) = self.fewest(map.index(node), facing)?;
+        let (_, heading) = self.fewest(map.grid.index(node), facing)?;
         Some(heading)
     }
 
@@ -142,7 +145,7 @@ impl Distances {
         *route = Route::default();
         let (mut node, mut heading) = (from, facing);
         while let Some(next) = self.next(map, node, heading) {
-            let Some(neighbour) = map.neighbour(node, next) else {
+            let Some(neighbour) = map.grid.neighbour(node, next) else {
                 return;
             };
             (node, heading) = (neighbour, next);
@@ -172,7 +175,7 @@ mod tests {
         for (x, y, heading) in ways {
             let block = Block {
                 node: Node::new(x, y),
-                heading: HEADINGS[heading],
+                heading: Heading::ALL[heading],
                 since: Duration::ZERO,
                 source: BlockSource::Sensor,
             };
@@ -184,13 +187,15 @@ mod tests {
     /// All distances by relaxing every edge until nothing changes (Floyd and Warshall): slow,
     /// and nothing like a breadth-first search. From `a` to `b` at `a * nodes + b`.
     fn oracle(map: &Map, blocks: &Blocks) -> Vec<Option<u16>> {
-        let count = map.node_count();
+        let count = map.grid.node_count();
         let mut edges = vec![None; count * count];
         for from in 0..count {
             edges[from * count + from] = Some(0);
-            for heading in HEADINGS {
-                if blocks.is_open(map, map.node(from), heading) {
-                    let to = map.index(map.neighbour(map.node(from), heading).unwrap());
+            for heading in Heading::ALL {
+                if blocks.is_open(map, map.grid.node(from), heading) {
+                    let to = map
+                        .grid
+                        .index(map.grid.neighbour(map.grid.node(from), heading).unwrap());
                     edges[from * count + to] = Some(1);
                 }
             }
@@ -222,8 +227,8 @@ mod tests {
         start: (Node, Heading),
         goal: Node,
     ) -> Option<(u16, u16)> {
-        let pose = |node: Node, heading: Heading| map.index(node) * 4 + heading as usize;
-        let mut costs = vec![None; map.node_count() * 4];
+        let pose = |node: Node, heading: Heading| map.grid.index(node) * 4 + heading as usize;
+        let mut costs = vec![None; map.grid.node_count() * 4];
         costs[pose(start.0, start.1)] = Some((0, 0));
         let mut changed = true;
         while core::mem::take(&mut changed) {
@@ -231,13 +236,16 @@ mod tests {
                 let Some((edges, turns)) = costs[place] else {
                     continue;
                 };
-                let node = map.node(place / 4);
-                for heading in HEADINGS
+                let node = map.grid.node(place / 4);
+                for heading in Heading::ALL
                     .into_iter()
                     .filter(|to| blocks.is_open(map, node, *to))
                 {
-                    let there = pose(map.neighbour(node, heading).unwrap(), heading);
-                    let cost = (edges + 1, turns + quarters(HEADINGS[place % 4], heading));
+                    let there = pose(map.grid.neighbour(node, heading).unwrap(), heading);
+                    let cost = (
+                        edges + 1,
+                        turns + quarters(Heading::ALL[place % 4], heading),
+                    );
                     if costs[there].is_none_or(|known| cost < known) {
                         costs[there] = Some(cost);
                         changed = true;
@@ -245,7 +253,7 @@ mod tests {
                 }
             }
         }
-        HEADINGS
+        Heading::ALL
             .into_iter()
             .filter_map(|heading| costs[pose(goal, heading)])
             .min()
@@ -260,29 +268,29 @@ mod tests {
         ) {
             let map = Map::grid(width, height);
             let blocks = blocked(&map, ways);
-            let count = map.node_count();
+            let count = map.grid.node_count();
             let truth = oracle(&map, &blocks);
             let mut distances = Box::<Distances>::default();
             for goal in 0..count {
-                distances.search(&map, &blocks, [map.node(goal); 2]);
+                distances.search(&map, &blocks, [map.grid.node(goal); 2]);
                 for from in 0..count {
-                    let node = map.node(from);
+                    let node = map.grid.node(from);
                     let shortest = truth[from * count + goal];
                     prop_assert_eq!(distances.from(&map, node), shortest);
                     let mut route = Route::default();
-                    distances.write_route(&map, node, HEADINGS[facing], &mut route);
+                    distances.write_route(&map, node, Heading::ALL[facing], &mut route);
                     prop_assert_eq!(route.length, shortest.unwrap_or(0));
                     let mut at = node;
                     for step in route.nodes() {
                         let to = Node::new(step.x, step.y);
-                        let open = HEADINGS.into_iter().any(|heading| {
-                            blocks.is_open(&map, at, heading) && map.neighbour(at, heading) == Some(to)
+                        let open = Heading::ALL.into_iter().any(|heading| {
+                            blocks.is_open(&map, at, heading) && map.grid.neighbour(at, heading) == Some(to)
                         });
                         prop_assert!(open, "{} to {} is no open way", at, to);
                         at = to;
                     }
                     if shortest.is_some() {
-                        prop_assert_eq!(at, map.node(goal));
+                        prop_assert_eq!(at, map.grid.node(goal));
                     }
                 }
             }
@@ -296,21 +304,21 @@ mod tests {
         ) {
             let map = Map::grid(width, height);
             let blocks = blocked(&map, ways);
-            let (from, goal) = (picks.0 % map.node_count(), picks.1 % map.node_count());
-            let facing = HEADINGS[picks.2];
+            let (from, goal) = (picks.0 % map.grid.node_count(), picks.1 % map.grid.node_count());
+            let facing = Heading::ALL[picks.2];
             let mut distances = Box::<Distances>::default();
-            distances.search(&map, &blocks, [map.node(goal); 2]);
+            distances.search(&map, &blocks, [map.grid.node(goal); 2]);
             let mut route = Route::default();
-            distances.write_route(&map, map.node(from), facing, &mut route);
-            let (mut at, mut heading, mut turns) = (map.node(from), facing, 0);
+            distances.write_route(&map, map.grid.node(from), facing, &mut route);
+            let (mut at, mut heading, mut turns) = (map.grid.node(from), facing, 0);
             for step in route.nodes() {
                 let to = Node::new(step.x, step.y);
-                let next = HEADINGS.into_iter().find(|next| next.step_from(at) == Some(to));
+                let next = Heading::ALL.into_iter().find(|next| next.step_from(at) == Some(to));
                 turns += quarters(heading, next.unwrap());
                 (at, heading) = (to, next.unwrap());
             }
-            let best = cheapest(&map, &blocks, (map.node(from), facing), map.node(goal));
-            let way = distances.from(&map, map.node(from)).map(|edges| (edges, turns));
+            let best = cheapest(&map, &blocks, (map.grid.node(from), facing), map.grid.node(goal));
+            let way = distances.from(&map, map.grid.node(from)).map(|edges| (edges, turns));
             prop_assert_eq!(way, best);
         }
 
@@ -322,14 +330,14 @@ mod tests {
         ) {
             let map = Map::grid(width, height);
             let blocks = blocked(&map, ways);
-            let count = map.node_count();
+            let count = map.grid.node_count();
             let (from, first, second) = (picks.0 % count, picks.1 % count, picks.2 % count);
-            let ends = [map.node(first), map.node(second)];
+            let ends = [map.grid.node(first), map.grid.node(second)];
             let truth = oracle(&map, &blocks);
             let best = [first, second].into_iter().filter_map(|end| truth[from * count + end]).min();
             let mut distances = Box::<Distances>::default();
             distances.search(&map, &blocks, ends);
-            prop_assert_eq!(distances.from(&map, map.node(from)), best);
+            prop_assert_eq!(distances.from(&map, map.grid.node(from)), best);
         }
     }
 

@@ -1,74 +1,61 @@
-//! The navigator's shell on the bus: it carries samples in and out and decides nothing.
+//! The navigator's shell on the bus: it carries samples in and out. It decides two things only: in
+//! which order it takes what has come, and that a press which lets the robot move came too late.
+//! [`Outgoing`] says in which order the answers go out, and when the order in force goes out again.
 //!
-//! One turn: wait, drain the topics that were rung for, hand each sample to the navigator, and send
-//! at once what changed. Events go out first, then the blocked ways, the queue and the status, then
-//! the order; what no service acts upon goes last. If the process is killed between any two of the
-//! first five, its successor knows at least as much as the bridge: an event may come twice, but is
-//! never lost. Only a setpoint that replaces a setpoint goes out before the status, because giving
-//! it twice has the effect of giving it once. The successor may not know its number, so it leaves
-//! one number out when it takes up a status. An unchanged order is renewed every 40 ms of robot
-//! time, with the frame before that moment if there is one.
+//! One turn: wait, drain the topics that have rung, hand each sample to the navigator, and send
+//! at once what changed. What is due before the next frame is sent with the frame at hand.
 //!
-//! A turn takes one decision for each sample and, only if there was none, one for the time that has
-//! passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`), and a
-//! renewal those of the newest frame since its order was given. How long frames took is counted
-//! when the turn's orders are out ([`FrameMeter`]).
+//! A turn makes one decision for each sample. Only if there was no sample, it makes one for the
+//! time that has passed. The consequences of a sample carry that sample's stamps
+//! (`lager_ports::Cause`), and a renewal carries those of the newest frame since its order was
+//! given. The latency of frames is counted when the turn's orders have left ([`FrameMeter`]).
 //!
-//! Last of all the journal is told (`nav/inputs`): the input, its time, and a proof of what became
-//! of it.
+//! Last of all the shell writes its journal (`nav/inputs`): the input, its time, and a proof of the
+//! navigator's answer.
 //!
-//! **Safe state**: silence. When this process ends, for whatever reason, the order in force is no
-//! longer renewed, and the bridge stops the robot when the lease is over, 120 ms later.
+//! **Safe state**: silence. When this process ends, nobody renews the order in force any more, and
+//! the bridge stops the robot when the lease is over, 120 ms later.
 
 mod journal;
 
 use core::time::Duration;
 
-use lager_ports::{
-    Bus, Cause, Clock, PortError, Publisher, ReceiveError, Sample, SendError, Shutdown, Subscriber,
-    Waiter, urgency,
-};
+use lager_home::Clock;
+use lager_orders::lease::LATEST_MOVE_NS;
+use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, Sample, SendError, Subscriber};
+use lager_sample::{Stamp, Topic};
 use lager_topics::{
-    InputKind, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, Mode,
-    NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput, Pick, SensorDistance,
-    SensorLine, Sent, Stamp, SteeringCommand, SteeringOrder, SteeringState, ToldKind, Topic,
+    InputKind, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,
+    NavBlocks, NavMap, NavRoute, NavStatus, NavigatorInputKind, NavigatorStatus, OperatorInput,
+    SensorDistance, SensorLine, Sent, SteeringCommand, SteeringState,
 };
-use lager_wire::Command;
+use lager_wake::{Shutdown, Waiter, urgency};
 
 use crate::config::LogicConfig;
+use crate::entry::{Beginning, Predecessor};
 use crate::latency::FrameMeter;
 use crate::navigator::{Input, Navigator};
-use crate::node::Node;
-use crate::told::{Beginning, Kept, goods_of};
+use crate::outgoing::{KnownHealth, Outgoing, Part};
+use crate::output::Output;
 use crate::traced::Traced;
 use journal::{Journal, Places};
 
-/// How often the order in force is renewed, in robot time; its lease is three times as long.
-const RENEWAL: Duration = Duration::from_millis(40);
-
-/// How often `nav/status` is published when nothing changes, in robot time.
-const STATUS_PERIOD: Duration = Duration::from_millis(50);
-
-/// How often the sensor board sees the line, in robot time. What falls due before the next frame is
-/// done with this one: no timer has to wake logic for it, least of all in the middle of a frame's
-/// way.
+/// How often the sensor board sees the line, in robot time. Work that is due before the next frame
+/// is done with this one, so no timer has to wake logic for it, least of all in the middle of a
+/// frame's way.
 const FRAME_PERIOD: Duration = Duration::from_millis(5);
 
-/// Longest wait for anything, in real time: a wake can be missed, and the shutdown flag is looked
-/// at that often.
+/// Longest wait for anything, in real time: a wake may be missed, and the shutdown flag is checked
+/// that often.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
-/// How late a press may come that lets the robot move, in ns of real time: this process may have
-/// been held up.
-const LATEST_NS: u64 = 200_000_000;
-
-/// How long a predecessor's status is waited for, in real time.
+/// How long a new logic waits for the status of the one before, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
 
 /// Runs the logic unit until `shutdown` is requested.
 ///
 /// # Errors
-/// Logic's place on the bus cannot be had; the sentence says what to do.
+/// Logic's ports on the bus cannot be opened; the sentence says what to do.
 pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), PortError> {
     let kept = match config.resume {
         true => {
@@ -77,7 +64,7 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
                 kept::<NavBlocks>(bus),
                 kept::<MissionQueue>(bus),
             );
-            status.map(|status| Kept {
+            status.map(|status| Predecessor {
                 status,
                 blocks: blocks.unwrap_or_default(),
                 queue: queue.unwrap_or_default(),
@@ -88,10 +75,10 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
     // The bridge's main loop is farther along the path.
     urgency::step_back(1, config.waiting);
     let mut shell = Shell::new(bus, config, &Beginning::new(config, kept))?;
-    shutdown.wake(shell.waiter.ringer()?);
+    shutdown.wake(shell.waiter.ringer());
     shell.publish_blocks(Cause::OWN);
     shell.publish_queue(Cause::OWN);
-    shell.repeat_status(shell.clock.now());
+    shell.keep_time(shell.clock.now(), Duration::ZERO);
     while !shutdown.is_requested() {
         shell.turn();
     }
@@ -100,8 +87,7 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
     Ok(())
 }
 
-/// What an earlier navigator has left. If it cannot be read, for whatever reason, the robot may be
-/// anywhere.
+/// The last sample of an earlier navigator. If it cannot be read, the robot may be anywhere.
 fn kept<T: Topic>(bus: &Bus) -> Option<T::Payload> {
     let kept = bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
         tracing::warn!("the earlier navigator's {} is lost: {error}", T::NAME);
@@ -134,19 +120,13 @@ struct Shell {
     journal: Journal,
 
     meter: FrameMeter,
-    /// Inputs the navigator was given.
+    /// Inputs that the navigator has had.
     decisions: u64,
-    /// Who may drive and whether a stop is latched, as the navigator was told last.
-    told_mode: Option<(Mode, bool)>,
-    /// What was driven by hand, as the navigator was told last.
-    told_by_hand: Option<u64>,
-    sent_status: NavigatorStatus,
-    status_due: Duration,
-    sent_order: Option<SteeringOrder>,
-    /// What the order in force rests on: the newest frame since it was given, or what it was given
-    /// for.
+    known_health: KnownHealth,
+    outgoing: Outgoing,
+    /// The cause of the order in force: the newest frame since it was given, or else the sample for
+    /// which it was given.
     rests_on: Cause,
-    renewal_due: Duration,
     lost_before: u64,
     complaints: u32,
     traced: Traced,
@@ -159,10 +139,10 @@ impl Shell {
             Some(status) => tracing::info!(
                 phase = ?status.phase,
                 order = status.order_id,
-                "the state of an earlier navigator is taken up"
+                "goes on from the state of an earlier navigator"
             ),
             None if config.resume => tracing::warn!(
-                "there is no state of an earlier navigator: where the robot is has to be told by a reset"
+                "there is no state of an earlier navigator: a reset must say where the robot is"
             ),
             None => {}
         }
@@ -171,7 +151,7 @@ impl Shell {
         let places = places(&commands, &status, &events);
         Ok(Self {
             clock: bus.clock(),
-            // Before the subscribers: what they miss while they are made is drained anyway.
+            // Before the subscribers: what they miss while they are made is drained later anyway.
             waiter: bus.waiter(config.waiting)?,
             line: bus.subscriber()?,
             distance: bus.subscriber()?,
@@ -191,14 +171,10 @@ impl Shell {
             latency: bus.publisher()?,
             meter: FrameMeter::default(),
             decisions: 0,
-            told_mode: None,
-            told_by_hand: None,
-            sent_status: navigator.status(),
+            known_health: KnownHealth::default(),
             navigator,
-            status_due: Duration::ZERO,
-            sent_order: None,
+            outgoing: Outgoing::default(),
             rests_on: Cause::OWN,
-            renewal_due: Duration::ZERO,
             lost_before: kept.map_or(0, |status| status.frames_lost),
             complaints: 0,
             traced: Traced::default(),
@@ -208,8 +184,8 @@ impl Shell {
     /// One turn of the loop.
     fn turn(&mut self) {
         self.wait();
-        // First who may drive and in what world, then what people want, then what the robot senses.
-        // The line comes last, so that its decision knows all the rest.
+        // First who may drive and in which world, then what people want, then what the robot
+        // senses. The line comes last, so that its decision knows everything else.
         let decisions = self.decisions;
         self.take_states();
         self.take_wishes();
@@ -231,8 +207,7 @@ impl Shell {
     }
 
     fn wait(&self) {
-        let due = self.status_due.min(self.renewal_due);
-        let left = due.saturating_sub(self.clock.now());
+        let left = self.outgoing.next_due().saturating_sub(self.clock.now());
         self.waiter.wait(self.clock.real(left).min(LONGEST_WAIT));
     }
 
@@ -248,18 +223,9 @@ impl Shell {
     }
 
     fn take_health(&mut self) {
-        if let Some((health, cause)) = self.next(|shell| shell.health.latest())
-            && let Some(mode) = health.mode.get()
-        {
-            if self.told_by_hand != Some(health.driven_by_hand) {
-                self.told_by_hand = Some(health.driven_by_hand);
-                self.decide(Input::DrivenByHand(health.driven_by_hand), cause);
-            }
-            let stopped = health.stopped != 0;
-            // The bridge repeats it ten times a second, and with every order it has taken.
-            if self.told_mode != Some((mode, stopped)) {
-                self.told_mode = Some((mode, stopped));
-                self.decide(Input::Mode { mode, stopped }, cause);
+        if let Some((health, cause)) = self.next(|shell| shell.health.latest()) {
+            for input in self.known_health.news(&health) {
+                self.decide(input, cause);
             }
         }
     }
@@ -273,53 +239,12 @@ impl Shell {
         if self.waiter.has::<OperatorInput>() {
             while let Some((input, cause)) = self.next(|shell| shell.inputs.receive()) {
                 let age_ns = Clock::monotonic_ns().saturating_sub(input.stamp().publish_time_ns);
-                if age_ns > LATEST_NS && input.kind.get().is_some_and(lets_it_move) {
+                if age_ns > LATEST_MOVE_NS && input.kind.get().is_some_and(lets_it_move) {
                     let late_ms = age_ns / 1_000_000;
                     tracing::warn!("{} came {late_ms} ms late and is not taken", input.kind);
                     continue;
                 }
-                match input.kind.get() {
-                    Some(kind @ (InputKind::PickupDone | InputKind::PickupForced)) => {
-                        let order_id = input.order_id;
-                        let forced = kind == InputKind::PickupForced;
-                        self.decide(Input::PickupDone { order_id, forced }, cause);
-                    }
-                    Some(InputKind::Placed) => {
-                        if let Some(heading) = input.heading.get() {
-                            let node = Node::new(input.x, input.y);
-                            self.decide(Input::Placed { node, heading }, cause);
-                        }
-                    }
-                    Some(InputKind::OrderCancelled) => {
-                        self.decide(Input::Cancel(input.order_id), cause);
-                    }
-                    Some(InputKind::OrderMovedUp) => {
-                        self.decide(Input::MoveUp(input.order_id), cause);
-                    }
-                    Some(InputKind::QueueCleared) => self.decide(Input::ClearQueue, cause),
-                    Some(InputKind::GoodsGone) => {
-                        if let Some(product) = goods_of(input.order_id) {
-                            self.decide(Input::GoodsGone(product), cause);
-                        }
-                    }
-                    Some(InputKind::GoodsBack) => {
-                        self.decide(Input::GoodsBack(goods_of(input.order_id)), cause);
-                    }
-                    Some(kind @ (InputKind::LinkLost | InputKind::LinkBack)) => {
-                        let lost = kind == InputKind::LinkLost;
-                        self.decide(Input::Link { lost }, cause);
-                    }
-                    Some(InputKind::PickByHand) => self.decide(Input::Pick(Pick::Manual), cause),
-                    Some(InputKind::PickByItself) => self.decide(Input::Pick(Pick::Auto), cause),
-                    Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
-                    // The switch is the bridge's (E14): the mode comes back with its health.
-                    Some(
-                        InputKind::SwitchPressed
-                        | InputKind::SwitchedToManual
-                        | InputKind::SwitchedToAutonomous,
-                    )
-                    | None => {}
-                }
+                self.decide(Input::Operator(&input), cause);
             }
         }
     }
@@ -346,7 +271,7 @@ impl Shell {
         }
     }
 
-    /// A sample that `receive` has returned, and the cause for everything that follows from it.
+    /// A sample that `receive` has returned, as the cause of everything that follows from it.
     fn next<T: Topic>(
         &mut self,
         receive: impl FnOnce(&mut Self) -> Result<Option<Sample<T>>, ReceiveError>,
@@ -363,7 +288,7 @@ impl Shell {
         }
     }
 
-    /// A frame was decided upon, and what follows from it is sent.
+    /// A frame was decided upon, and its consequences are sent.
     fn note(&mut self, stamp: &Stamp, cause: Cause) {
         self.rests_on = cause;
         self.meter.took(stamp, cause.receive_time_ns());
@@ -375,44 +300,16 @@ impl Shell {
         self.tell(input, cause, now);
     }
 
-    /// Hands one input to the navigator and sends what changed because of it.
+    /// Hands one input to the navigator and sends what changes.
     fn tell(&mut self, input: Input<'_>, cause: Cause, now: Duration) {
         self.decisions = self.decisions.wrapping_add(1);
         let output = self.navigator.handle(now, input);
-        for event in &output.events {
-            let sent = self.events.send(cause, *event);
-            self.check(sent);
-        }
         let order = self.navigator.current_order();
-        let is_new = order != self.sent_order;
-        let goes_first = is_setpoint(order) && is_setpoint(self.sent_order);
-        self.sent_order = order;
-        if is_new {
+        if order != self.outgoing.order() {
             self.rests_on = cause;
         }
-        if is_new && goes_first {
-            self.give_order(now, cause);
-        }
-        if output.blocks_changed {
-            self.publish_blocks(cause);
-        }
-        if output.queue_changed {
-            self.publish_queue(cause);
-        }
-        if output.status_changed {
-            self.publish_status(now);
-        }
-        if is_new && !goes_first {
-            self.give_order(now, cause);
-        }
-        if output.route_changed {
-            let sent = self.route.send(cause, *self.navigator.route());
-            self.check(sent);
-        }
-        if let Some(thought) = output.thought {
-            tracing::debug!("{thought}");
-            let sent = self.thoughts.send(cause, thought);
-            self.check(sent);
+        for part in self.outgoing.after(now, order, &output) {
+            self.send(part, &output, cause);
         }
         let places = places(&self.commands, &self.status, &self.events);
         let navigator = &self.navigator;
@@ -420,20 +317,53 @@ impl Shell {
         self.check(told);
     }
 
-    /// Does what is due by the clock, or so soon.
-    fn keep_time(&mut self, now: Duration, ahead: Duration) {
-        if now + ahead >= self.status_due {
-            self.repeat_status(now);
-        }
-        if now + ahead >= self.renewal_due {
-            self.give_order(now, self.rests_on);
-            if self.sent_order.is_some() {
-                self.tell_again(now, ToldKind::Renewed);
+    fn send(&mut self, part: Part, output: &Output, cause: Cause) {
+        match part {
+            Part::Events => {
+                for event in &output.events {
+                    let sent = self.events.send(cause, *event);
+                    self.check(sent);
+                }
+            }
+            Part::Blocks => self.publish_blocks(cause),
+            Part::Queue => self.publish_queue(cause),
+            Part::Status => self.publish_status(),
+            Part::Order => self.give_order(cause),
+            Part::Route => {
+                let sent = self.route.send(cause, *self.navigator.route());
+                self.check(sent);
+            }
+            Part::Thought => {
+                if let Some(thought) = output.thought {
+                    tracing::debug!("{thought}");
+                    let sent = self.thoughts.send(cause, thought);
+                    self.check(sent);
+                }
             }
         }
     }
 
-    /// Counts the frames of this turn, whose orders are out, and tells it once a second.
+    /// Sends again the states that are due now, or before the next frame.
+    fn keep_time(&mut self, now: Duration, ahead: Duration) {
+        for part in self.outgoing.again(now, ahead) {
+            let kind = match part {
+                Part::Order => {
+                    self.give_order(self.rests_on);
+                    NavigatorInputKind::Renewed
+                }
+                _ => {
+                    self.publish_status();
+                    NavigatorInputKind::Repeated
+                }
+            };
+            let places = places(&self.commands, &self.status, &self.events);
+            let told = self.journal.again(now, kind, places);
+            self.check(told);
+        }
+    }
+
+    /// Counts the frames of this turn, whose orders have left, and publishes the counts once a
+    /// second.
     fn tell_latency(&mut self, now_ns: u64) {
         self.meter.turn_over(now_ns);
         if let Some(latency) = self.meter.due(now_ns) {
@@ -442,20 +372,8 @@ impl Shell {
         }
     }
 
-    fn repeat_status(&mut self, now: Duration) {
-        self.publish_status(now);
-        self.tell_again(now, ToldKind::Repeated);
-    }
-
-    fn tell_again(&mut self, now: Duration, kind: ToldKind) {
-        let places = places(&self.commands, &self.status, &self.events);
-        let told = self.journal.again(now, kind, places);
-        self.check(told);
-    }
-
-    fn give_order(&mut self, now: Duration, cause: Cause) {
-        self.renewal_due = now + RENEWAL;
-        if let Some(order) = self.sent_order {
+    fn give_order(&mut self, cause: Cause) {
+        if let Some(order) = self.outgoing.order() {
             let sent = self.commands.send(cause, order);
             self.check(sent);
         }
@@ -473,19 +391,17 @@ impl Shell {
         self.check(sent);
     }
 
-    fn publish_status(&mut self, now: Duration) {
-        self.status_due = now + STATUS_PERIOD;
-        self.sent_status = self.navigator.status();
+    fn publish_status(&mut self) {
         let status = NavigatorStatus {
             frames_lost: self.lost_before + self.lost(),
-            ..self.sent_status
+            ..self.navigator.status()
         };
         let sent = self.status.send(Cause::OWN, status);
         self.check(sent);
     }
 
-    /// Samples missed on the topics on which each sample counts; of the others only the last one
-    /// does.
+    /// Samples missed on the topics on which each sample counts; on the others only the last one
+    /// counts.
     fn lost(&self) -> u64 {
         self.line.lost()
             + self.distance.lost()
@@ -509,7 +425,7 @@ impl Shell {
     }
 }
 
-/// How far the publishers have come whose samples are proved.
+/// The numbers of the publishers whose samples are proved.
 fn places(
     commands: &Publisher<SteeringCommand>,
     statuses: &Publisher<NavStatus>,
@@ -529,14 +445,7 @@ fn sent<T: Topic>(publisher: &Publisher<T>) -> Sent {
     }
 }
 
-/// Whether an order holds until another one comes, rather than running once.
-fn is_setpoint(order: Option<SteeringOrder>) -> bool {
-    order
-        .and_then(|order| Command::from_code(order.code))
-        .is_some_and(|command| !command.is_one_shot())
-}
-
-/// Whether the robot may drive off when it has been told this.
+/// Whether the robot may drive off after this input.
 const fn lets_it_move(kind: InputKind) -> bool {
     matches!(
         kind,
@@ -544,5 +453,6 @@ const fn lets_it_move(kind: InputKind) -> bool {
             | InputKind::PickupForced
             | InputKind::ResetPressed
             | InputKind::Placed
+            | InputKind::WayOpened
     )
 }

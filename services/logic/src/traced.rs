@@ -1,5 +1,6 @@
-//! Spans of the log: a mission from its first order until none is left, and each order of it. What
-//! logic says while one lasts carries it. They change with the queue, never with a frame.
+//! Spans of the log: a mission from its first order until none is left, and each order of it.
+//! Logic's log lines carry the spans that last at that time. They change with the queue, never with
+//! a frame.
 
 use lager_topics::OrderQueue;
 use tracing::span::EnteredSpan;
@@ -17,7 +18,7 @@ impl Traced {
         let under_way = (queue.under_way != 0).then_some(queue.order_id);
         let known = self.order.as_ref().map(|(id, _)| *id);
         if known != under_way {
-            // The inner one ends first.
+            // The inner span ends first.
             self.order = None;
         }
         let is_mission = under_way.is_some() || queue.count > 0;

@@ -1,34 +1,35 @@
-//! How many quarters a turn that has ended has turned.
+//! Finds out how many quarters a turn has made, after its end.
 //!
 //! The steering board turns by time and ends early when the tape comes under its centre sensors
-//! (AMB-22), so "done" alone does not say where the robot looks: a cross bar, a spot of dirt or an
+//! (AMB-22). So "done" alone does not say where the robot looks: a cross bar, a spot of dirt or an
 //! interruption can end a turn anywhere. The angle from dead reckoning tells whole quarters from
-//! fragments, and what is left over counts for the next quarter of the same turn.
+//! fragments, and the rest counts for the next quarter of the same turn.
 //!
 //! ```text
 //!   0        60         80    90         150         172  180
 //!   | fragment | by line | one quarter     | by line   | two quarters
 //! ```
 //!
-//! One turn makes two quarters when there was no tape at the first, or when an interrupted turn is
+//! One turn makes two quarters if there was no tape at the first, or if an interrupted turn is
 //! given again.
 //!
-//! A quarter that ended by time, with no tape in sight, has not told where the robot really looks.
-//! So what dead reckoning is wrong by in the first of two adds to that of the second: tape that
-//! comes in sight 15 degrees before a half turn is over may seem to come after only 140 degrees.
+//! A quarter that ended by time, with no tape in sight, has not shown where the robot really looks.
+//! So the error of dead reckoning in the first of two quarters adds to that of the second: tape
+//! that comes in sight 15 degrees before a half turn is over may seem to come after only 140
+//! degrees.
 
 use lager_wire::LineState;
 
-use crate::heading::Spin;
+use lager_floor::Spin;
 
-/// Below this a turn has not found the tape it was to find: the tape behind is seen up to 15
-/// degrees, the tape ahead from 75.
+/// Below this a turn has not found its tape: the tape behind is seen up to 15 degrees, the tape
+/// ahead from 75.
 const FRAGMENT_DEG: f32 = 60.0;
-/// The same behind a quarter that ended without tape: what was behind is far away by then.
+/// The same after a quarter that ended without tape: the old tape is far away by then.
 const FRAGMENT_BEYOND_BARE_DEG: f32 = 40.0;
-/// From here the rest is small enough for the line control, if it has the tape in sight.
+/// From here the line control can correct the rest, if it has the tape in sight.
 const QUARTER_DEG: f32 = 80.0;
-/// From here tape under the sensors is that of the second quarter.
+/// From here tape under the sensors belongs to the second quarter.
 const BEYOND_DEG: f32 = 150.0;
 /// From here the rest of a half turn is small enough.
 const HALF_DEG: f32 = 172.0;
@@ -47,8 +48,8 @@ pub fn is_bare(seen: LineState) -> bool {
     matches!(seen, LineState::NotOnLine | LineState::DropStation)
 }
 
-/// Judges a turn the board carried out, with `seen` under the sensors. `turned_deg` is positive
-/// in the direction of the turn; `from_bare`: the quarter before it ended without tape.
+/// Judges a turn that the board carried out, with `seen` under the sensors. `turned_deg` is
+/// positive in the direction of the turn. `from_bare`: the quarter before it ended without tape.
 pub fn done(turned_deg: f32, seen: LineState, from_bare: bool) -> Turned {
     let on_tape = !is_bare(seen);
     let fragment_deg = match from_bare && on_tape {
@@ -64,10 +65,10 @@ pub fn done(turned_deg: f32, seen: LineState, from_bare: bool) -> Turned {
 
 /// Judges a turn that was cut short, once the robot stands and `seen` is under its sensors.
 ///
-/// To turn again from the new tape would lead past it to the next one, so the tape counts when it
-/// is in the middle or already on the far side. Where no tape is in sight the turn goes on,
-/// whatever dead reckoning says: after several interruptions dead reckoning is the less reliable of
-/// the two, and a turn that is given again ends on tape, at the first quarter or at the second.
+/// A further turn from the new tape would lead past it to the next one. So the tape counts when it
+/// is in the middle or already on the far side. If no tape is in sight the turn goes on, whatever
+/// dead reckoning says: after several interruptions dead reckoning is the less reliable of the two,
+/// and a turn that is given again ends on tape, at the first quarter or at the second.
 pub fn interrupted(turned_deg: f32, spin: Spin, seen: LineState) -> Turned {
     let beyond = match spin {
         Spin::Left => LineState::LeftOfLine,
@@ -124,10 +125,10 @@ mod tests {
     fn an_interrupted_turn_counts_when_the_new_tape_is_reached() {
         use LineState::{LeftOfLine, NotOnLine, OnLine, RightOfLine};
         let table = [
-            // Still on the old tape, whatever it looks like.
+            // It is still on the old tape, whatever that looks like.
             (10.0, OnLine, Turned::Fragment),
             (40.0, NotOnLine, Turned::Fragment),
-            // Turning right, the new tape comes in from the right: the robot is left of it.
+            // When it turns right, the new tape comes in from the right: the robot is left of it.
             (78.0, LeftOfLine, Turned::Fragment),
             (78.0, OnLine, Turned::Quarters(1)),
             (78.0, RightOfLine, Turned::Quarters(1)),

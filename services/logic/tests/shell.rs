@@ -1,24 +1,27 @@
-//! The shell on a real bus: what goes out, in which order, and what a successor takes up.
+//! Tests of the shell on a real bus: what it publishes and in which order, and its successor.
 
 use std::time::{Duration, Instant};
 
 use lager_logic::{LogicConfig, run};
-use lager_ports::{Bus, Cause, Publisher, Shutdown, Subscriber};
+use lager_orders::Mode;
+use lager_ports::{Bus, Cause, Publisher, Subscriber};
 use lager_rig::{Domain, one_square};
+use lager_sample::{Stamp, Topic};
 use lager_topics::{
     DistanceFrame, EventKind, Health, Input, InputKind, LineFrame, LinkHealth, LogThought,
-    MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput,
-    Order, Phase, Role, SensorDistance, SensorLine, Stamp, SteeringCommand, SteeringOrder,
-    SteeringReport, SteeringState, Topic,
+    MissionEvent, MissionOrder, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput, Order,
+    Phase, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder, SteeringReport,
+    SteeringState, ThoughtKind,
 };
+use lager_wake::Shutdown;
 use lager_wire::LineState;
 
-/// A bus of its own for one test.
+/// A bus that only one test uses.
 fn domain() -> Domain {
     Domain::new("lager-logic").unwrap()
 }
 
-/// What a steering board says that stands.
+/// The report of a steering board that stands.
 fn report() -> SteeringReport {
     SteeringReport {
         age_ms: 0,
@@ -40,7 +43,7 @@ struct World {
     route: Subscriber<NavRoute>,
     seen: Option<NavigatorStatus>,
     given: Vec<SteeringOrder>,
-    /// The stamps of what was given.
+    /// The stamps of the given orders.
     stamps: Vec<Stamp>,
 }
 
@@ -63,7 +66,7 @@ impl World {
         }
     }
 
-    /// Tells the retained topics, and lets the boards report standing on the line.
+    /// Publishes the retained topics, and lets the boards report a robot that stands on the line.
     fn tell(&self, mode: Mode, stopped: bool) {
         self.map.send(Cause::OWN, one_square()).unwrap();
         let health = Health {
@@ -80,7 +83,7 @@ impl World {
         self.line.send(Cause::OWN, frame).unwrap();
     }
 
-    /// Reads what logic has sent. An order is read before the status, so a status that went out
+    /// Reads what logic has sent. It reads orders before the status, so a status that logic sent
     /// before its order is always there.
     fn look(&mut self) {
         while let Some(order) = self.commands.receive().unwrap() {
@@ -95,7 +98,7 @@ impl World {
         }
     }
 
-    /// Goes on telling and looking until `done`; the watchdog against hanging for ever.
+    /// Publishes and reads until `done`; the watchdog ends a test that hangs.
     #[track_caller]
     fn until(&mut self, what: &str, stopped: bool, mut done: impl FnMut(&Self) -> bool) {
         let start = Instant::now();
@@ -110,12 +113,12 @@ impl World {
         }
     }
 
-    /// Sends samples faster than they are read until the status counts some as missed.
+    /// Sends samples faster than logic reads them, until the status counts some as missed.
     #[track_caller]
     fn miss(&mut self, topic: &str, send: impl Fn(&Self)) {
         let frames_lost = |world: &Self| world.seen.map_or(0, |status| status.frames_lost);
         let start = Instant::now();
-        // What the telling before this has cost is told by now.
+        // By then the status has counted the samples missed before this.
         let settled = Instant::now() + Duration::from_millis(150);
         while Instant::now() < settled {
             std::thread::sleep(Duration::from_millis(5));
@@ -192,7 +195,7 @@ fn an_order_leads_to_a_renewed_steering_order_and_is_announced() {
         );
         let thought = world.thoughts.receive().unwrap().expect("a thought");
         assert_eq!(thought.from.get(), Some(Role::Logic));
-        // The near end of the edge is where the robot stands, so no node is left to pass.
+        // The robot stands at the near end of the edge, so no node is left to pass.
         let route = world.route.latest().unwrap();
         assert!(route.is_none_or(|route| route.length == 0));
     });
@@ -237,7 +240,7 @@ fn a_renewal_does_not_wait_for_its_own_time_when_a_frame_comes_shortly_before() 
     let bus = domain.open(Role::Supervisor);
     let mut world = World::new(&bus);
     with_logic(&domain, false, || {
-        // Alone a renewal is due after 40 ms, and not a moment sooner.
+        // Without a frame the renewal comes after 40 ms, and not a moment sooner.
         let is_early = |pair: &[(SteeringOrder, Stamp)]| {
             let [(before, first), (order, second)] = pair else {
                 return false;
@@ -300,7 +303,7 @@ fn a_successor_takes_up_the_kept_state() {
     keeper.hand_over().unwrap();
     with_logic(&domain, true, || {
         world.until("the successor drives", false, |world| {
-            // What the supervisor does for as long as nobody has taken the topic up.
+            // The supervisor does this until another process publishes the topic.
             keeper.remember().unwrap();
             world.given.iter().any(|order| order.code == 3)
         });
@@ -323,7 +326,7 @@ fn what_is_missed_is_counted_on_every_topic_where_each_sample_counts() {
         world.until("logic has its map", false, |world| {
             world.phase() == Some(Phase::WaitingForOrder)
         });
-        // Bursts of one topic at a time, far beyond what a subscriber holds.
+        // Bursts on one topic at a time, with many more samples than a subscriber's queue holds.
         world.miss("sensor/line", |world| {
             world.line.send(Cause::OWN, LineFrame::default()).unwrap();
         });
@@ -368,7 +371,7 @@ fn a_successor_that_finds_nothing_kept_knows_no_place_until_a_reset() {
     world.until("it refuses an order", false, |world| {
         let order = Order { id: 7, product: 1 };
         world.orders.send(Cause::OWN, order).unwrap();
-        // Standing still is all that it orders.
+        // It orders nothing but to stand.
         assert!(world.given.iter().all(|order| order.code == 1));
         world.given.len() > 20
     });
@@ -387,4 +390,29 @@ fn a_successor_that_finds_nothing_kept_knows_no_place_until_a_reset() {
     });
     shutdown.request();
     logic.join().unwrap();
+}
+
+#[test]
+fn the_horn_is_heard_as_a_thought() {
+    let domain = domain();
+    with_logic(&domain, false, || {
+        let bus = domain.open(Role::Supervisor);
+        let mut world = World::new(&bus);
+        let presses = bus.publisher::<OperatorInput>().unwrap();
+        world.until("logic is up", false, |world| world.seen.is_some());
+        let horn = Input {
+            kind: InputKind::Horn.into(),
+            ..Input::default()
+        };
+        presses.send(Cause::OWN, horn).unwrap();
+        let start = Instant::now();
+        loop {
+            assert!(start.elapsed() < Duration::from_secs(60), "nobody honks");
+            match world.thoughts.receive().unwrap() {
+                Some(thought) if thought.kind == ThoughtKind::Honks => return,
+                Some(_) => {}
+                None => std::thread::sleep(Duration::from_millis(5)),
+            }
+        }
+    });
 }

@@ -1,4 +1,4 @@
-//! A sample as text for people: a row of a table where the payload is small, else a block.
+//! Writes a sample as text for people: a row of a table if the payload is small, else a block.
 //!
 //! ```text
 //! at s            age ms  by             number  link_epoch  distance (cm)  packet_id
@@ -11,37 +11,37 @@
 //!   epoch                  1           1
 //! ```
 //!
-//! Nothing here knows a topic; [`crate::sentence`] says what a sample means. The table gives order,
-//! names and kinds of the fields, and the end of a field's name is its unit. A value that equals
-//! the payload's blank value is unknown and shown as `-`. Enums are words, and fields of the same
-//! structure stand beside each other. A histogram is shown by its quantiles. Numbers are exact,
-//! except for floating-point ones, which have three decimals; programs take the JSON.
+//! This module knows no topic; [`crate::sentence`] says what a sample means. The payload's
+//! description gives the order, names and kinds of the fields. The end of a field's name is its
+//! unit. A value that equals the payload's blank value is unknown, and is printed as `-`. Enums are
+//! words, and fields of the same structure stand beside each other. A histogram appears as its
+//! quantiles. Whole numbers are exact, other numbers have three decimals. Programs read the JSON.
 
 use std::fmt::Write;
 
 use lager_ports::Found;
-use lager_topics::{Schema, Stamp, Topic};
+use lager_sample::{Schema, Stamp, Topic};
 use serde_json::Value;
 
 use crate::{ToolError, durations, sentence};
 
 /// A payload with at most so many fields is a row.
 const WIDEST_ROW: usize = 6;
-/// How far a block's values stand from its left edge.
+/// The column at which a block's values begin.
 const VALUES_AT: usize = 24;
-/// What is not known.
+/// Stands for an unknown value.
 const UNKNOWN: &str = "-";
 /// Fields that say yes or no as 1 or 0.
 const YES_OR_NO: [&str; 4] = ["up", "stopped", "under_way", "arm_granted"];
 
-/// How samples of one topic are written.
+/// How to write the samples of one topic.
 #[derive(Debug)]
 pub(crate) struct Blocks {
     topic: String,
     fields: Vec<String>,
-    /// The payload's blank value; null where it is not known.
+    /// The payload's blank value; null if it is not known.
     blank: Value,
-    /// The columns' widths so far, where samples are rows; none before the first.
+    /// The columns' widths so far, if samples are rows; empty before the first sample.
     row: Option<Vec<usize>>,
     /// What a sample means in words.
     sentence: fn(&Value) -> Option<String>,
@@ -61,7 +61,7 @@ impl Blocks {
         })
     }
 
-    /// For a topic of which only its description is known.
+    /// For a topic of which only the description is known.
     pub(crate) fn of_found(found: &Found) -> Result<Self, ToolError> {
         let description = found.description();
         let zeros = vec![0; description.size()];
@@ -74,7 +74,7 @@ impl Blocks {
         })
     }
 
-    /// One sample as it was received at `received_ns`, with its line ends.
+    /// The text of one sample that was received at `received_ns`, with its line ends.
     pub(crate) fn sample(
         &mut self,
         stamp: &Stamp,
@@ -124,7 +124,7 @@ impl Blocks {
             cells.push((head, plain(name, value, blank)));
         }
         let is_first = widths.is_empty();
-        // Most words are no longer, so that most columns keep their width.
+        // Most words are not longer, so most columns keep their width.
         widths.resize(cells.len(), 8);
         for (width, (head, value)) in widths.iter_mut().zip(&cells) {
             *width = length(head).max(length(value)).max(*width);
@@ -188,13 +188,13 @@ impl Blocks {
     }
 }
 
-/// Whether a payload like this one is shown as a row.
+/// Whether a payload of this kind is shown as a row.
 fn is_row(blank: &Value) -> bool {
     let is_flat = members(blank).all(|(_, value)| !value.is_object() && !value.is_array());
     is_flat && members(blank).count() <= WIDEST_ROW
 }
 
-/// Fields that are made of fields: those of the same make beside each other.
+/// Fields that have fields themselves. Those of the same type stand beside each other.
 fn table(text: &mut String, beside: &[(&str, &Value, &Value)]) -> std::fmt::Result {
     let mut left = beside;
     while let Some((_, first, _)) = left.first() {
@@ -227,7 +227,7 @@ fn table(text: &mut String, beside: &[(&str, &Value, &Value)]) -> std::fmt::Resu
     Ok(())
 }
 
-/// A list: numbers and nodes in a line, anything else as a line for each.
+/// A list: numbers and nodes in one line, everything else on a line for each.
 fn listed(
     text: &mut String,
     name: &str,
@@ -275,7 +275,7 @@ fn listed(
     Ok(())
 }
 
-/// Cells at the right of their columns, which are two blanks apart.
+/// Cells at the right of their columns, with two blanks between the columns.
 fn line<'a>(
     text: &mut String,
     widths: &[usize],
@@ -332,7 +332,7 @@ pub(crate) fn words(variant: &str) -> String {
     words
 }
 
-/// A whole number of small units as so many decimals of a larger one.
+/// Writes a whole number of small units with so many decimals of a larger unit.
 fn scaled(number: u64, decimals: u32) -> String {
     let one = 10_u64.pow(decimals);
     let width = decimals as usize;
@@ -342,11 +342,11 @@ fn scaled(number: u64, decimals: u32) -> String {
 /// What a number counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Unit {
-    /// Nothing that its name would say.
+    /// The name says no unit.
     None,
-    /// This.
+    /// This unit.
     Whole(&'static str),
-    /// Tenths of this.
+    /// Tenths of this unit.
     Tenths(&'static str),
     /// Nanoseconds, shown in microseconds.
     Nanoseconds,
@@ -362,7 +362,7 @@ impl Unit {
     }
 }
 
-/// What a field's name ends with, the longer endings first.
+/// The units at the ends of fields' names, the longer endings first.
 const UNITS: [(&str, Unit); 11] = [
     ("_mm_per_s", Unit::Whole("mm/s")),
     ("_mm", Unit::Whole("mm")),

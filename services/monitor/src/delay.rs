@@ -1,8 +1,8 @@
-//! `topic delay`: how old samples are when they are published and when an observer has them.
+//! `topic delay`: how old samples are when they are published, and when an observer gets them.
 //!
-//! An observer is never woken: it looks every millisecond, and a sample waits for its look. That
-//! wait is the observer's own and says nothing of the bus, so it is told apart by the moment at
-//! which each look begins:
+//! Nobody wakes an observer. It looks every millisecond, and a sample waits for the next look. This
+//! wait says nothing about the bus. So the tool notes when each look begins, and reports the wait
+//! separately:
 //!
 //! ```text
 //!  source_time --> publish_time ~~~~> look --> received
@@ -12,23 +12,24 @@
 //!    | written            |          read      |       one that came during the look
 //! ```
 //!
-//! What the bus takes is in `read`, as far as an observer can see it: a sample that waited had
-//! arrived long before. `lager bench hop` measures how long a woken receiver takes.
+//! `read` contains the time that the bus takes, as far as an observer can see it. `lager bench hop`
+//! measures how long a receiver takes that the bus wakes.
 
 use std::io::Write;
 use std::time::Duration;
 
 use hdrhistogram::Histogram;
-use lager_ports::Pace;
+use lager_wake::Pace;
 use serde_json::{Value, json};
 
 use crate::measure::{Gauge, Limits, Plan, Seen};
 use crate::{ToolError, Tools};
 
-/// Between two looks: a fifth of the other tools' shortest wait, so that its own is short.
+/// The time between two looks. It is a fifth of the other tools' shortest one, so the wait is
+/// short.
 const POLL: Duration = Duration::from_millis(1);
 
-/// The longest delay that is told from longer ones, in ns: a minute.
+/// Longer delays are not told apart, in ns: a minute.
 const LONGEST_NS: u64 = 60_000_000_000;
 
 impl<W: Write> Tools<'_, W> {
@@ -95,9 +96,9 @@ struct Delays {
     samples: u64,
     /// From the source to the publication.
     written: Stage,
-    /// From the publication to the look that found the sample.
+    /// From the publication to the beginning of the look that found the sample.
     own_wait: Stage,
-    /// From there, or from the publication if that came later, to the sample in hand.
+    /// From that moment until the observer had the sample; from the publication if it came later.
     read: Stage,
 }
 
@@ -149,7 +150,7 @@ impl Gauge for Delays {
 
 #[cfg(test)]
 mod tests {
-    use lager_topics::Stamp;
+    use lager_sample::Stamp;
 
     use super::*;
 
@@ -172,7 +173,7 @@ mod tests {
         assert_eq!(delays.written.max(), 2_000);
         assert_eq!(delays.own_wait.max() / 1_000, 900);
         assert_eq!(delays.read.max(), 500);
-        // One that comes while the observer looks has waited for nobody.
+        // A sample that comes during the look has not waited.
         let mut delays = Delays::default();
         delays.add(&seen(1_000, 3_000, 2_500, 3_700));
         assert_eq!((delays.own_wait.max(), delays.read.max()), (0, 700));

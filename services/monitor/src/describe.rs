@@ -1,4 +1,4 @@
-//! `topic list` and `topic info`: what is on the bus, and what one topic is.
+//! `topic list` and `topic info`: the topics of the bus, and the properties of one.
 
 use std::io::Write;
 
@@ -9,39 +9,39 @@ use serde_json::json;
 use crate::{Count, ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
-    /// `topic list`: every topic that is open on the bus, of every robot or only of the tools'.
+    /// `topic list`: every open topic on the bus, of every robot or only of the tools' robot.
     /// Returns how many there are.
     ///
     /// # Errors
-    /// The bus cannot be looked at, or the output cannot be written.
+    /// The state of the bus cannot be read, or the output cannot be written.
     pub fn list(&mut self, every_robot: bool) -> Result<usize, ToolError> {
         let topics = self
             .watchdog
             .over("listing the topics", || self.bus.topics())?;
         let mut topics: Vec<_> = topics
             .into_iter()
-            .filter(|topic| every_robot || topic.robot == *self.bus.robot())
+            .filter(|topic| every_robot || topic.unit == *self.bus.unit())
             .collect();
-        topics.sort_by(|a, b| a.robot.cmp(&b.robot));
+        topics.sort_by(|a, b| a.unit.cmp(&b.unit));
         let count = topics.len();
         if topics.is_empty() && !self.as_json {
             let of = match every_robot {
                 true => "on this bus".to_owned(),
-                false => format!("of the robot `{}`", self.bus.robot()),
+                false => format!("of the robot `{}`", self.bus.unit()),
             };
             writeln!(self.out, "no topic {of} is open; `lager up` starts a robot")?;
         }
         for topic in topics {
             if self.as_json {
                 let value = json!({
-                    "robot": topic.robot.as_str(), "topic": topic.name,
+                    "robot": topic.unit.as_str(), "topic": topic.name,
                     "publishers": topic.publishers, "subscribers": topic.subscribers,
                     "observers": topic.observers, "ours": topic.layout == Layout::Ours,
                 });
                 writeln!(self.out, "{value}")?;
                 continue;
             }
-            let name = format!("lager/{}/{}", topic.robot, topic.name);
+            let name = format!("lager/{}/{}", topic.unit, topic.name);
             match topic.layout {
                 Layout::Ours | Layout::Described => {
                     let publishers = Count(topic.publishers, "publisher").to_string();
@@ -61,7 +61,7 @@ impl<W: Write> Tools<'_, W> {
         Ok(count)
     }
 
-    /// `topic info`: what one topic carries, its limits, and who is on it now.
+    /// `topic info`: what one topic carries, its limits, and who writes and reads it now.
     ///
     /// # Errors
     /// No topic has that name, or the output cannot be written.
@@ -73,7 +73,7 @@ impl<W: Write> Tools<'_, W> {
         let live = self
             .watchdog
             .over("looking at the topic", || {
-                self.bus.topics_of(self.bus.robot())
+                self.bus.topics_of(self.bus.unit())
             })
             .into_iter()
             .find(|topic| topic.name == name);
@@ -146,22 +146,24 @@ impl<W: Write> Tools<'_, W> {
             writers.chain(readers).chain(woken)
         });
         for (done, peer) in ends {
-            let role = peer
-                .role
-                .map_or("a stranger".into(), |role| role.to_string());
             let by = if done == "woken" { "is" } else { "by" };
-            writeln!(out, "    {done:7} {by} {role}, process {}", peer.pid)?;
+            writeln!(
+                out,
+                "    {done:7} {by} {}, process {}",
+                peer.who(),
+                peer.pid
+            )?;
         }
         Ok(())
     }
 
-    /// What a topic that is in no table says of itself.
+    /// Describes a topic that is not in the table.
     fn info_of_found(&mut self, name: &str) -> Result<(), ToolError> {
         let topics = self
             .watchdog
             .over("looking at the topic", || self.bus.topics())?;
         let mut topics = topics.into_iter();
-        let topic = topics.find(|topic| topic.robot == *self.bus.robot() && topic.name == name);
+        let topic = topics.find(|topic| topic.unit == *self.bus.unit() && topic.name == name);
         let described = topic.and_then(|mut topic| Some((topic.description.take()?, topic)));
         let (description, topic) = described.ok_or_else(|| UnknownTopic(name.to_owned()))?;
         let (publishers, subscribers) = (topic.publishers, topic.subscribers);

@@ -1,12 +1,13 @@
-//! A histogram of durations for people: its quantiles in place of its buckets.
+//! Shows a histogram of durations to people: as quantiles, not as buckets.
 //!
-//! It is apart from [`crate::block`], which knows no type, because a histogram says nothing to a
-//! person bucket by bucket. Programs take the JSON, which has the buckets.
+//! This file stands apart because [`crate::block`] knows no types, and because a person cannot read
+//! a histogram bucket by bucket. Programs take the JSON, which has the buckets.
 
-use lager_topics::{Durations, Schema};
+use lager_sample::Schema;
+use lager_topics::Durations;
 use serde_json::{Value, json};
 
-/// What is shown in place of the histograms in `payload`.
+/// Replaces the histograms in `payload` by what people see.
 pub(crate) fn readable(payload: &Value) -> Value {
     match payload {
         Value::Object(members) if is_histogram(payload) => serde_json::from_value(payload.clone())

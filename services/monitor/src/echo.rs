@@ -1,11 +1,14 @@
-//! `topic echo`: each sample with its stamp, as a block or a row for people or as JSON.
+//! `topic echo`: each sample with its stamp, for people as a block or a row, for programs as JSON.
 
 use std::collections::HashMap;
 use std::io::Write;
 use std::time::Instant;
 
-use lager_ports::{Clock, Source, urgency};
-use lager_topics::{Description, Stamp, Topic, TopicVisitor, by_id, visit};
+use lager_home::Clock;
+use lager_ports::Source;
+use lager_sample::{Description, Stamp, Topic};
+use lager_topics::{TopicVisitor, by_id, visit};
+use lager_wake::urgency;
 use serde_json::{Value, json};
 
 use crate::block::Blocks;
@@ -16,7 +19,7 @@ use crate::{Count, POLL, ToolError, Tools};
 /// What `topic echo` shows, and when it ends.
 #[derive(Clone, Debug, Default)]
 pub struct EchoConfig {
-    /// Fields by their dotted paths, the only ones that are shown; empty for whole samples.
+    /// Dotted paths of the fields to show; empty for whole samples.
     pub fields: Vec<String>,
     /// When to end.
     pub limits: Limits,
@@ -41,15 +44,15 @@ impl<W: Write> Tools<'_, W> {
         }
     }
 
-    /// Who writes, in words: its role where the bus knows it, and its process.
+    /// The writer in words: its role if the bus knows it, and its process.
     fn writer(&self, pid: u32) -> String {
         let nodes = self
             .watchdog
             .over("looking for the writer", || self.bus.nodes());
         let role = nodes
             .unwrap_or_default()
-            .iter()
-            .find_map(|node| node.role.filter(|_| node.pid == pid));
+            .into_iter()
+            .find_map(|node| node.part.filter(|_| node.pid == pid));
         match role {
             Some(role) => format!("{role} ({pid})"),
             None => format!("process {pid}"),
@@ -135,7 +138,7 @@ impl<W: Write> Tools<'_, W> {
     }
 }
 
-/// What of a sample was asked for: all, or an object of the fields by their paths.
+/// The wished part of a sample: all of it, or an object of the fields by their paths.
 fn chosen(payload: Value, fields: &[String]) -> Value {
     if fields.is_empty() {
         return payload;
@@ -144,7 +147,7 @@ fn chosen(payload: Value, fields: &[String]) -> Value {
     Value::Object(fields.iter().map(value).collect())
 }
 
-/// What stands at a path; null behind the end of a list that ends early.
+/// The value at a path; null beyond the end of a list.
 fn at<'a>(payload: &'a Value, path: &str) -> &'a Value {
     path.split('.').fold(payload, |value, part| match value {
         Value::Array(list) => part
@@ -164,7 +167,7 @@ fn plain(value: &Value) -> String {
     }
 }
 
-/// What a sample followed from, for programs; null = from no sample.
+/// The cause of a sample, for programs; null if no sample caused it.
 fn cause(stamp: &Stamp) -> Value {
     if stamp.cause_topic == 0 {
         return Value::Null;

@@ -1,13 +1,16 @@
-//! The topic tools: list, info, echo, hz, bw, delay and pub, for any topic of any robot, by name;
-//! `lager top`, which shows all of them at once (`top`); and the table of topics for Python
-//! programs (`python.rs`), which needs no robot.
+//! The topic tools list, info, echo, hz, bw, delay and pub. They work on any topic of any robot, by
+//! its name. Also here: `lager top`, which shows all topics at once (`top`), and the table of
+//! topics for Python programs (`python.rs`), which needs no robot.
 //!
-//! All but pub are observers: they poll, hold no listener and never slow the path. They know no
-//! topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`. The table
-//! leads from a name to its static type; a topic that is in no table brings its description along.
-//! Each tool writes text or one JSON value a line to the writer that it is given, and says how many
-//! samples it lost. Every call into the bus is made under a watchdog, so that a tool reports a bus
-//! that does not answer and does not wait for it.
+//! `pub` moves no robot by mistake: it holds the locks of the robot's name and of its bridge. If
+//! the robot is up, it needs `--live`, and then writes only topics that several programs may write.
+//!
+//! All tools but `pub` are observers: they poll, hold no listener and never slow the path. They
+//! know no topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`.
+//! The table leads from a name to its static type. A topic that is not in the table carries its own
+//! description. Each tool writes text, or one JSON value in each line, and says how many samples it
+//! lost. A watchdog guards every call into the bus, so a tool reports a bus that does not answer,
+//! and does not wait for it.
 
 mod block;
 mod delay;
@@ -26,11 +29,11 @@ use std::fmt;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use lager_ports::{
-    Bus, Found, IntrospectError, Look, PortError, ReceiveError, Shortage, Shutdown, Source,
-    Subscriber, Watchdog,
-};
-use lager_topics::{NoField, Topic, UnknownTopic};
+use lager_home::Shortage;
+use lager_ports::{Bus, Found, IntrospectError, Look, PortError, ReceiveError, Source, Subscriber};
+use lager_sample::{NoField, Topic};
+use lager_topics::UnknownTopic;
+use lager_wake::{Shutdown, Watchdog};
 
 pub use echo::EchoConfig;
 pub use measure::Limits;
@@ -46,13 +49,13 @@ const POLL: Duration = Duration::from_millis(5);
 pub struct Tools<'a, W> {
     /// The bus, as an observer of the robot.
     pub bus: &'a Bus,
-    /// What watches over the calls into it.
+    /// Guards the calls into the bus.
     pub watchdog: &'a Watchdog,
-    /// The wish to end.
+    /// The request to end.
     pub shutdown: &'a Shutdown,
-    /// One JSON value a line instead of text for people.
+    /// Whether to write JSON, one value a line, and no text for people.
     pub as_json: bool,
-    /// Where it is written.
+    /// Where to write.
     pub out: &'a mut W,
 }
 
@@ -62,7 +65,7 @@ impl<W: Write> Tools<'_, W> {
         Ok(self.watchdog.over("opening the topic", open)?)
     }
 
-    /// A topic that is in no table but on the bus.
+    /// Opens a topic that is not in the table but on the bus.
     fn found(&self, name: &str, unknown: UnknownTopic) -> Result<Found, ToolError> {
         let found = self
             .watchdog
@@ -79,9 +82,8 @@ impl<W: Write> Tools<'_, W> {
         Ok(self.watchdog.over("reading the topic", receive)?)
     }
 
-    /// Waits a moment for the next sample. A subscriber that cannot reach a writer for want of
-    /// something, or whose bus was cleared, hears nothing and no error, so whoever has heard
-    /// nothing asks.
+    /// Waits a moment for the next sample. A subscriber gets no error if it cannot reach its
+    /// writer, or if somebody has replaced the bus. So after a silence the tool asks why.
     fn pause(&self, silent_since: Instant, pace: Duration) -> Result<(), ToolError> {
         if silent_since.elapsed() >= SILENCE {
             if let Some(shortage) = Shortage::now() {
@@ -96,7 +98,7 @@ impl<W: Write> Tools<'_, W> {
     }
 }
 
-/// How long nothing may come before the machine is asked whether it is the cause.
+/// After how long a silence the tool asks why.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// Why a tool could not do its work.
@@ -105,7 +107,7 @@ pub enum ToolError {
     /// No topic has that name.
     #[error(transparent)]
     Unknown(#[from] UnknownTopic),
-    /// The bus could not be looked at.
+    /// The state of the bus could not be read.
     #[error(transparent)]
     Look(#[from] IntrospectError),
     /// The topic could not be opened.
@@ -114,12 +116,12 @@ pub enum ToolError {
     /// The topic could not be read.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
-    /// Nothing comes, and this is why.
+    /// No samples come, for this reason.
     #[error("nothing can be read: {0}")]
     Short(Shortage),
-    /// Nothing will come any more.
+    /// The bus is another one now, so no sample will come any more.
     #[error(
-        "the bus was damaged and has been cleared since this began; start it again to see the robot"
+        "the bus was damaged and replaced since this tool began; start it again to see the robot"
     )]
     Cleared,
     /// The output could not be written.
@@ -134,7 +136,7 @@ pub enum ToolError {
 }
 
 impl ToolError {
-    /// Whether only the reader of the output has gone, as after `| head`.
+    /// Whether only the output's reader has gone, as after `| head`.
     pub fn is_closed_output(&self) -> bool {
         matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
     }

@@ -1,30 +1,33 @@
-//! What `topic hz`, `bw` and `delay` share: they look at stamps only, and tell each second what the
-//! samples of that second were.
+//! The common part of `topic hz`, `bw` and `delay`. They read only the stamps, and print a line for
+//! the samples of each second.
 
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Pace, Source};
-use lager_topics::{Stamp, Topic, TopicVisitor, visit};
+use lager_home::Clock;
+use lager_ports::Source;
+use lager_sample::{Stamp, Topic};
+use lager_topics::{TopicVisitor, visit};
+use lager_wake::Pace;
 use serde_json::{Value, json};
 
 use crate::source::Stamped;
 use crate::{ToolError, Tools};
 
-/// One line is printed for each window.
+/// The tool prints one line for each window.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// When a tool ends by itself; whatever comes first.
+/// When a tool ends by itself: at whichever limit comes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Limits {
-    /// After so long.
+    /// After this time.
     pub duration: Option<Duration>,
-    /// After so many samples.
+    /// After this many samples.
     pub count: Option<u64>,
 }
 
 impl Limits {
-    /// Whether it is to end after so long and so many samples.
+    /// Whether the tool ends after this time and this many samples.
     pub(crate) fn are_reached(&self, began: Instant, samples: u64) -> bool {
         self.count.is_some_and(|count| samples >= count)
             || self
@@ -33,36 +36,36 @@ impl Limits {
     }
 }
 
-/// One sample as an observer meets it.
+/// One sample, as an observer finds it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
     pub(crate) stamp: Stamp,
-    /// When the look at the queue began that found it.
+    /// When the look began that found it.
     pub(crate) looked_ns: u64,
     pub(crate) received_ns: u64,
 }
 
-/// What is measured of the samples of one window.
+/// Measures the samples of one window.
 pub(crate) trait Gauge {
     fn add(&mut self, seen: &Seen);
 
-    /// The gauge of the window that follows.
+    /// The gauge of the next window.
     fn next(&self) -> Self;
 
-    /// For programs, an object.
+    /// The figures for programs, as an object.
     fn as_json(&self) -> Value;
 
-    /// For people, what stands before the losses.
+    /// The figures for people, without the losses.
     fn as_text(&self) -> String;
 }
 
-/// What is measured and how.
+/// What to measure, and how.
 pub(crate) struct Plan<F> {
     pub(crate) limits: Limits,
     pub(crate) pace: Pace,
-    /// The line above the first one; none if it is empty.
+    /// The head line; empty for none.
     pub(crate) head: &'static str,
-    /// Makes a gauge for payloads of so many bytes.
+    /// Makes a gauge for payloads of this many bytes.
     pub(crate) gauge: F,
 }
 

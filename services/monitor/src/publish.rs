@@ -1,68 +1,69 @@
-//! `topic pub`: samples of any topic from JSON, on the command line or from standard input.
+//! `topic pub`: publishes samples of any topic from JSON, which comes from the command line or from
+//! standard input.
 //!
-//! **What moves a robot is not published beside it by mistake.** A topic of the table is published
-//! under the locks of the robot's name and of its bridge, as a player does, so while a robot of
-//! that name is up it is refused, and none can start. Beside a robot that is up, only `--live`
-//! publishes, and only what the table lets several write (orders and inputs, which the arbiter and
-//! the navigator judge like anybody's). What one service alone writes, such as `sensor/line` or
-//! `nav/status`, is never published beside a robot: readers would see two worlds, and a successor
-//! would resume from the wrong one. Other people's topics move no robot of ours; one that somebody
-//! else writes takes `--live` as well.
+//! **Nobody moves a robot with it by mistake.** To publish a topic of the table, the tool takes the
+//! locks of the robot's name and of its bridge, as a player does. So it refuses while a robot of
+//! that name is up, and no such robot can start meanwhile. If a robot is up, the tool needs
+//! `--live`. Then it publishes only topics that several programs may write: orders and inputs,
+//! which the arbiter and the navigator judge as they judge everybody's. It never publishes what
+//! only one service writes, such as `sensor/line` or `nav/status`: readers would see two worlds,
+//! and the service's successor would resume from the wrong one. Topics of other programs move no
+//! robot. If such a program writes the topic as well, the tool needs `--live`, too.
 
 use std::io::Write;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use lager_ports::{
-    AnyPublisher, Bus, IntrospectError, Lock, LockError, Peer, PortError, SendError,
-};
-use lager_topics::{Role, TOPICS, TopicEntry};
+use lager_home::{Lock, LockError};
+use lager_ports::{AnyPublisher, Bus, IntrospectError, Peer, PortError, SendError};
+use lager_sample::TopicEntry;
+use lager_topics::{Role, TOPICS};
 use serde_json::{Value, json};
 
 use crate::measure::Limits;
 use crate::{Count, Tools};
 
-/// How long readers get to find the writer before its first sample, and to take the last one.
+/// How long the tool waits for readers before its first sample and after its last one.
 const MEET: Duration = Duration::from_millis(300);
-/// How often the wish to end is looked at, and late readers get the states.
+/// How often the tool checks for its end, and sends the states to late readers.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Where payloads come from.
 #[derive(Debug)]
 pub enum Payloads {
-    /// This one, again and again.
+    /// This payload, again and again.
     One(Value),
-    /// Each that somebody hands over, or the sentence that says why there are no more.
+    /// Each payload that comes through here, or the sentence that says why no more come.
     Each(Receiver<Result<Value, String>>),
 }
 
-/// What is published and how.
+/// What to publish, and how.
 #[derive(Debug)]
 pub struct Publishing {
     /// The payloads.
     pub payloads: Payloads,
-    /// How many a second; `None`: as soon as they come.
+    /// How many a second. `None`: each as soon as it comes.
     pub rate: Option<f64>,
     /// When to end.
     pub limits: Limits,
-    /// Whether to publish beside a robot or another writer.
+    /// Whether to publish although a robot is up or another program writes the topic.
     pub live: bool,
 }
 
-/// Why something is not published.
+/// Why the tool does not publish.
 #[derive(Debug, thiserror::Error)]
 pub enum PublishError {
     /// There is no such topic.
     #[error(
-        "nobody has a topic `{0}` open, and this build's table has none; start whoever reads it first"
+        "nobody has a topic `{0}` open, and this build's table has none; start its reader first"
     )]
     Unknown(String),
-    /// A robot is up that the topic may move.
+    /// A robot is up, which may move by the topic.
     #[error("{topic} is not published beside a robot: {remedy}")]
     Up {
         /// The topic.
         topic: String,
-        /// What would do.
+        /// What to do instead.
         remedy: String,
         /// Which robot.
         #[source]
@@ -76,17 +77,17 @@ pub enum PublishError {
         /// Who.
         writer: String,
     },
-    /// A payload does not fit.
+    /// A payload does not fit the topic.
     #[error("payload {number} of {topic}: {error}")]
     Payload {
         /// The topic.
         topic: String,
         /// Which one, from 1.
         number: u64,
-        /// What is wrong, and what it may be.
+        /// What is wrong, and what would fit.
         error: serde_json::Error,
     },
-    /// No more can be read.
+    /// No more payloads can be read.
     #[error("payload {number}: {why}")]
     Input {
         /// Which one, from 1.
@@ -94,7 +95,7 @@ pub enum PublishError {
         /// Why.
         why: String,
     },
-    /// The bus cannot be looked at.
+    /// The state of the bus cannot be read.
     #[error(transparent)]
     Look(#[from] IntrospectError),
     /// The topic cannot be opened.
@@ -109,19 +110,19 @@ pub enum PublishError {
 }
 
 impl<W: Write> Tools<'_, W> {
-    /// `topic pub`: publishes on `name` until there is no more, a limit or the shutdown, and says
-    /// how much that was.
+    /// `topic pub`: publishes on `name` until the payloads, a limit or the shutdown end it. Returns
+    /// how many samples it published.
     ///
     /// # Errors
-    /// A robot is up or somebody else writes the topic, nobody knows it, or a payload does not fit
-    /// it.
+    /// A robot is up or somebody else writes the topic, nobody knows the topic, or a payload does
+    /// not fit it.
     pub fn publish(&mut self, name: &str, what: &Publishing) -> Result<(), PublishError> {
         let permit = || permit(self.bus, name, what.live);
         let _locks = self.watchdog.over("looking at the topic", permit)?;
         let open = || self.bus.any_publisher(name);
         let publisher = self.watchdog.over("opening the topic", open)?;
         let publisher = publisher.ok_or_else(|| PublishError::Unknown(name.to_owned()))?;
-        // What does not fit is refused before anybody waits.
+        // Refuse a wrong payload before the wait for readers.
         let one = match &what.payloads {
             Payloads::One(value) => Some(made(&publisher, value, 1)?),
             Payloads::Each(_) => None,
@@ -169,7 +170,7 @@ impl<W: Write> Tools<'_, W> {
         Ok(())
     }
 
-    /// Whether so long has passed before the wish to end.
+    /// Waits for this time. Returns false if somebody ends the tool before.
     fn rest(&self, publisher: &AnyPublisher, long: Duration) -> bool {
         let end = Instant::now() + long;
         loop {
@@ -187,7 +188,7 @@ impl<W: Write> Tools<'_, W> {
         }
     }
 
-    /// What is handed over next; `None` at the end, or when the end is wished for.
+    /// The next payload; `None` at the end, or when somebody ends the tool.
     fn next(
         &self,
         publisher: &AnyPublisher,
@@ -217,7 +218,7 @@ fn made(publisher: &AnyPublisher, value: &Value, number: u64) -> Result<Vec<u8>,
     Ok(payload)
 }
 
-/// What is held while the topic is written, if it may be.
+/// Takes the locks that the tool holds while it writes the topic, if it may write it.
 fn permit(bus: &Bus, name: &str, live: bool) -> Result<Vec<Lock>, PublishError> {
     bus.sweep();
     let entry = TOPICS.iter().find(|entry| entry.name == name);
@@ -229,16 +230,16 @@ fn permit(bus: &Bus, name: &str, live: bool) -> Result<Vec<Lock>, PublishError> 
                 remedy: remedy(entry),
                 lock,
             };
-            let robot = bus.robot();
+            let robot = bus.unit();
             vec![
-                bus.place().lock_name(robot).map_err(refused)?,
-                bus.place().lock(robot, Role::Bridge).map_err(refused)?,
+                bus.home().lock_name(robot).map_err(refused)?,
+                bus.home().lock(robot, Role::Bridge).map_err(refused)?,
             ]
         }
         _ => Vec::new(),
     };
     let mut topics = bus.topics()?.into_iter();
-    let topic = topics.find(|topic| topic.robot == *bus.robot() && topic.name == name);
+    let topic = topics.find(|topic| topic.unit == *bus.unit() && topic.name == name);
     let writers = topic.map(|topic| topic.writers).unwrap_or_default();
     match writers.first() {
         Some(writer) if !live || has_one_writer => Err(PublishError::Written {
@@ -249,7 +250,7 @@ fn permit(bus: &Bus, name: &str, live: bool) -> Result<Vec<Lock>, PublishError> 
     }
 }
 
-/// How one gets what one wants although a robot is up.
+/// What a user can do although a robot is up.
 fn remedy(entry: &TopicEntry) -> String {
     if entry.qos.publishers == 1 {
         return "one service alone writes it; publish it under another name with --name".to_owned();
@@ -265,7 +266,7 @@ fn remedy(entry: &TopicEntry) -> String {
 }
 
 fn described(peer: &Peer) -> String {
-    match peer.role {
+    match &peer.part {
         Some(role) => format!("{role}, process {}", peer.pid),
         None => "a stranger".to_owned(),
     }

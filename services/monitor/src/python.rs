@@ -1,20 +1,21 @@
 //! `topic schema --python`: the table of topics as Python modules, for `bus/python`.
 //!
-//! The module has a ctypes class and a numpy dtype for each payload, the stub has their types. Both
-//! are kept in the repository, because an installed package has no `lager` beside it. The dtypes'
-//! offsets are Rust's; the classes' are found by ctypes, so that comparing the two means something.
+//! The module has a ctypes class and a numpy dtype for each payload; the stub file has their types.
+//! Both files are in the repository, because an installed package has no `lager` beside it. The
+//! dtypes take their offsets from Rust and the classes from ctypes, so a test can compare the two.
 
 use std::collections::BTreeSet;
 use std::fmt::{self, Write};
 use std::io;
 use std::path::Path;
 
-use lager_topics::{FieldInfo, Make, Stamp, StructInfo, TOPICS};
+use lager_sample::{FieldInfo, Make, Stamp, StructInfo};
+use lager_topics::TOPICS;
 
-/// What a person types to make both files again.
+/// The command that makes both files again.
 const COMMAND: &str = "lager topic schema --python bus/python/lagerrobot";
 
-/// Writes `layouts.py` and `layouts.pyi` into `folder`, which must be there.
+/// Writes `layouts.py` and `layouts.pyi` into `folder`, which must exist.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -34,7 +35,7 @@ fn python() -> [String; 2] {
     [module(&types), stub(&types)].map(|text| text.expect("a string takes everything"))
 }
 
-/// Every type of the table once, each behind those that it contains.
+/// Every type of the table once, after the types that it contains.
 #[derive(Default)]
 struct Types {
     enums: Vec<(&'static str, &'static [(u8, &'static str)])>,
@@ -173,7 +174,7 @@ fn listed(fields: &[FieldInfo], each: impl Fn(&FieldInfo) -> Option<String>) -> 
         .join(", ")
 }
 
-/// A name that Python has no other use for: `from_` for `from`, as its own libraries do it.
+/// A name that is not a word of Python: `from_` for `from`, as Python's own libraries write it.
 fn word(name: &str) -> String {
     const KEYWORDS: [&str; 35] = [
         "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class",

@@ -1,10 +1,10 @@
-//! `topic hz` and `topic bw`: rate, bytes and loss of one topic, and how old its samples were when
-//! they were published, once a second, from the stamps alone.
+//! `topic hz` and `topic bw`: rate, bytes and losses of one topic, and how old its samples were at
+//! their publication. Once a second, from the stamps alone.
 
 use std::io::Write;
 
-use lager_ports::Pace;
-use lager_topics::Stamp;
+use lager_sample::Stamp;
+use lager_wake::Pace;
 use serde_json::{Value, json};
 
 use crate::measure::{Gauge, Limits, Plan, Seen};
@@ -55,8 +55,8 @@ struct Rate {
 }
 
 impl Rate {
-    /// Samples a second since the last one before the window, or in the first window since its
-    /// first one, up to the last. A topic that comes once a second has a rate, too.
+    /// Samples a second, from the last sample before the window to the last one in it. In the first
+    /// window, from its first sample. So a topic that comes once a second has a rate, too.
     fn hz(&self) -> f64 {
         if self.samples == 0 {
             return 0.0;
@@ -119,7 +119,7 @@ impl Gauge for Rate {
     }
 }
 
-/// How many bytes a second a topic carries.
+/// Counts the bytes a second of a topic.
 struct Bandwidth {
     /// Bytes of a payload.
     payload: usize,

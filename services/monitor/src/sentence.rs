@@ -1,10 +1,12 @@
-//! What a sample means in words, where its payload says something to people: a thought, or what is
-//! wrong. The language is chosen here and nowhere before.
+//! Says in words what a sample means, for the payloads that speak to people: thoughts and failures.
+//! Only this file chooses a language.
 
-use lager_topics::{Failure, LogThought, MissionEvent, NavStatus, Thought, Topic};
+use lager_sample::Topic;
+use lager_topics::{Failure, LogThought, MissionEvent, NavStatus, Thought};
 use serde_json::Value;
 
-/// What makes a sentence of a sample of `T` in JSON; `None` from it where nothing is to be said.
+/// The function that makes a sentence of a sample of `T` in JSON, if `T` has one. It returns `None`
+/// for a sample that says nothing.
 pub(crate) fn of<T: Topic>() -> fn(&Value) -> Option<String> {
     match T::NAME {
         LogThought::NAME => thought,

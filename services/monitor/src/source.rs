@@ -1,7 +1,7 @@
-//! What the tools take of a sample.
+//! The parts of a sample that the tools use.
 
 use lager_ports::Look;
-use lager_topics::Stamp;
+use lager_sample::Stamp;
 use serde::Serialize;
 use serde_json::{Value, to_value};
 

@@ -2,7 +2,7 @@
 // somebody else may have the wheel. STOP and its keys work meanwhile: nothing here is in front of them.
 
 import { judge, wrong } from "./fields.js";
-import { reason } from "./reasons.js";
+import { called, reason } from "./sentences.js";
 import { put, say } from "./words.js";
 
 /** Which way a robot on the delivery corner looks into the warehouse. */
@@ -71,6 +71,6 @@ export class Asked {
     const { box, said } = this.parts;
     const who = robot?.driver && robot.driver === this.link.me ? robot.asks : null;
     box.hidden = !who;
-    put(said, who ? say("asks", who) : "");
+    put(said, who ? say("asks", called(who)) : "");
   }
 }

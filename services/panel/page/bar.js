@@ -1,11 +1,11 @@
-// The first row: which robot, how fresh, who drives, what it does; and STOP, which never waits.
+// The first row: which robot, what state it is in, who drives, how fresh; and STOP, which never waits.
 
 import { named } from "./chosen.js";
-import { crossing, failure, sentence } from "./sentences.js";
-import { reason } from "./reasons.js";
+import { age, causeOf, face, show } from "./face.js";
+import { called, sentence } from "./sentences.js";
 import { Resume } from "./resume.js";
 import { Stop } from "./stop.js";
-import { decimal, put, say, span } from "./words.js";
+import { decimal, put, say } from "./words.js";
 
 export class Bar {
   /** `resumes` are the buttons that end a stop when they are held. */
@@ -18,76 +18,58 @@ export class Bar {
     this.stop = new Stop(link, { form: parts.form, button: parts.stop, said: parts.stopSaid }, robot, name, () => this.resume.letGo());
   }
 
+  /** Draws it; the state that it shows. */
   draw(robot, now) {
     const { parts } = this;
-    const stale = !robot || robot.isStale(now);
-    document.body.classList.toggle("stale", stale);
-    document.body.classList.toggle("stopped", robot?.state.stopped === "1");
+    const state = face(this.link, robot, now);
+    show(state, robot);
     put(parts.link, this.linkWords(robot, now));
-    put(parts.linkSaid, !this.link.open ? this.lostWords() : robot && stale ? say("old") : "");
-    const { mode, stopped } = robot?.state ?? {};
+    const { mode, battery_dv: decivolts, hold, stopped } = robot?.state ?? {};
     put(parts.mode, stopped === "1" ? say("stopped_short") : mode ? say(`mode_${mode}`) : "");
     put(parts.driver, this.driverWords(robot));
-    const { battery_dv: decivolts, hold } = robot?.state ?? {};
     const volts = decivolts === undefined ? "" : decimal(Number(decivolts) / 10);
     parts.battery.classList.toggle("low", hold === "battery");
     put(parts.battery, volts && say(hold === "battery" ? "battery_low" : "volts", volts));
-    put(parts.doing, doing(robot));
     this.drawStop(robot);
+    this.tell(state, robot);
+    return state;
   }
 
+  /** By voice, once: what is wrong and nobody here has brought about. */
+  tell({ look, said }, robot) {
+    const isNew = look === "stopped" && this.looked !== "stopped" && this.lookOf === robot;
+    if (look === "unheard") put(this.parts.told, `${said}. ${say("old")}`);
+    else if (look !== "stopped") put(this.parts.told, "");
+    else if (isNew && !this.parts.stopSaid.textContent) put(this.parts.told, say("stopped_elsewhere", causeOf(robot)));
+    this.looked = look;
+    this.lookOf = robot;
+  }
+
+  /** How old what is heard is. */
   linkWords(robot, now) {
-    const heard = robot && Number.isFinite(robot.heard) ? say("age", span(robot.age(now))) : say("unheard");
-    if (!this.link.open) return robot ? `${this.lostWords()}, ${heard}` : this.lostWords();
-    if (!robot) return named() && this.link.me ? say("not_here", named()) : say("no_robot");
-    if (!robot.connected) return say("no_link", heard);
-    if (!robot.speaks) return say("plain");
-    if (robot.isStale(now)) return say("stale", span(now - Math.max(robot.stated, 0)));
-    return say("link", Math.round(robot.age(now)));
-  }
-
-  /** Why there is no connection. */
-  lostWords() {
-    return this.link.closed ? reason(this.link.closed) : say("lost");
+    if (!robot || !Number.isFinite(robot.heard)) return "\u2013";
+    const isFresh = this.link.open && robot.connected && !robot.isStale(now);
+    return isFresh ? `${Math.round(robot.age(now))} ms` : age(now - Math.max(Math.min(robot.heard, robot.stated), 0));
   }
 
   driverWords(robot) {
     if (!robot) return "";
     if (!this.link.mayDrive && this.link.open) return say("viewer");
-    if (robot.driver) return say("person", robot.driver === this.link.me ? `${robot.driver} ✓` : robot.driver);
+    if (robot.driver) return robot.driver === this.link.me ? sentence("cell_me") : called(robot.driver);
     if (robot.state.stopped === "1") return "";
     return robot.state.mode === "autonomous" ? say("station_drives") : say("nobody");
   }
 
   drawStop(robot) {
-    const { halt, haltSaid, haltThen, resume, stopSaid, stopWhom, stopAll } = this.parts;
+    const { resumePlace, resume, resumeThen, stopAll } = this.parts;
     const isStopped = robot?.state.stopped === "1";
-    put(stopWhom, robot?.name ?? named() ?? "");
     stopAll.hidden = this.link.robots.size < (robot || !named() ? 2 : 1);
-    halt.hidden = resume.hidden = !isStopped;
+    resumePlace.hidden = resume.hidden = !isStopped;
     this.resume.draw(robot);
-    if (isStopped) {
-      put(haltSaid, stopped(robot));
-      put(haltThen, after(robot));
-      // Whoever has not stopped it himself is told once, by voice as well.
-      const isNew = this.wasStopped === false && this.stopOf === robot;
-      if (isNew && !stopSaid.textContent) this.stop.say("stopped_elsewhere", causeOf(robot));
-    } else if (this.wasStopped) {
-      this.stop.say(null);
-    }
+    if (isStopped) put(resumeThen, after(robot));
+    else if (this.wasStopped) this.stop.say(null);
     this.wasStopped = isStopped;
-    this.stopOf = robot;
   }
-}
-
-const causeOf = (robot) => sentence(`stop_cause_${robot.state.stop_cause}`) ?? "";
-
-/** That a robot is stopped, since when and why. */
-export function stopped(robot) {
-  const since = robot.stoppedSince;
-  const cause = causeOf(robot);
-  const tail = cause ? `: ${cause}` : "";
-  return since === null ? `${say("stopped_short")}${tail}` : say("stopped", span(Math.max(0, Date.now() - since)), tail);
 }
 
 /** What it does once the stop is released. */
@@ -96,26 +78,4 @@ function after(robot) {
   if (mode === "manual") return say("then_stands");
   if (remedy && remedy !== "resume") return say("then_needs");
   return product === undefined ? say("then_waits") : say("then_fetches", product);
-}
-
-/** By the names of the robot: what holds it when it does not hear a board. */
-const HELD_BY = { sensor: "blind", steering: "unheard" };
-
-/** What a robot does, in words. */
-export function doing(robot) {
-  const { phase, next, product, hold, remedy, stopped: isStopped } = robot?.state ?? {};
-  if (!phase) return isStopped === "1" ? say("stopped_short") : "";
-  // What it did before it was stopped it does no more.
-  const does = phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase;
-  const words = [isStopped === "1" ? say("stopped_short") : does];
-  if (product !== undefined) words.push(say(isStopped === "1" ? "was_to_fetch" : "fetches", product));
-  if (hold !== "none") words.push(sentence(`hold_${hold}`));
-  for (const board of ["sensor", "steering"]) {
-    // The reason why it stands may have said it.
-    if (robot.state[`${board}_up`] === "0" && hold !== HELD_BY[board]) words.push(say("board_lost", say(`board_${board}`)));
-  }
-  const why = failure({ ...robot.state, failure_node: robot.state.node });
-  // Stop and mode stand beside it.
-  const end = ["resume", "mode"].includes(remedy) ? null : sentence(`remedy_${remedy}`);
-  return [words.filter(Boolean).join(", "), why, end].filter(Boolean).join(". ");
 }

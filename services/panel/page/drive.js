@@ -1,22 +1,21 @@
 // Driving by hand: keys, buttons, a gamepad; one held command at a time, given again until it is let go.
 //
-//   key, finger or stick down --> armed, driver, fresh state? --> "drive code lease" every 50 ms
+//   key, finger or stick down --> armed, driver, fresh state? --> "drive code" every 50 ms
 //   up, blur, hidden, cancel, menu, lost link, stale state ----> "drive 1" once, then silence
 //
 // Of two that are held the newer one counts, and when it is let go the older one again. Whatever
 // else ends a hold ends both.
 //
-// A command lives 200 ms by its lease, so a page that dies lets the robot stand. Steps of the arm and
-// the eighth turns are given once a press. Nothing cuts one of them short but the command to stand:
-// what is held ends before one, and nothing is held or begun while one is under way.
+// The station gives each command its lease of 150 ms, so a page that dies lets the robot stand. Steps
+// of the arm and the eighth turns are given once a press. Nothing cuts one of them short but the
+// command to stand: what is held ends before one, and nothing is held or begun while one is under way.
 
 import { Pads } from "./pads.js";
-import { reason } from "./reasons.js";
+import { reason } from "./sentences.js";
 import { isText } from "./stop.js";
 import { say } from "./words.js";
 
 const RENEW_MS = 50;
-const LEASE_MS = 200;
 /** Code 1 of the wheels. */
 const STAND = 1;
 /** Unsent bytes beyond which nothing more is given. */
@@ -132,7 +131,7 @@ export class Driving {
     if (why || robot !== this.robot()) return this.letGo(...(why ?? []));
     if (this.link.backlog > BACKLOG) return this.letGo("full");
     const held = this.held;
-    const answer = await this.link.act(robot, `drive ${code} ${LEASE_MS}`);
+    const answer = await this.link.act(robot, `drive ${code}`);
     // What was let go meanwhile has its own end.
     if (answer.refused && this.held === held) {
       this.letGo();
@@ -148,7 +147,7 @@ export class Driving {
     this.held = null;
     this.older = [];
     for (const button of document.querySelectorAll("#pad .down")) button.classList.remove("down");
-    if (this.link.open) this.link.act(robot, `drive ${STAND} ${LEASE_MS}`);
+    if (this.link.open) this.link.act(robot, `drive ${STAND}`);
     if (why.length) this.tell(...why);
   }
 
@@ -170,7 +169,7 @@ export class Driving {
     const why = this.objection();
     if (why) return this.tell(...why);
     const robot = this.robot();
-    const isStand = action === `drive ${STAND} 1000`;
+    const isStand = action === `drive ${STAND}`;
     if (!isStand && this.step === robot) return this.tell("wait");
     const wasHeld = this.held !== null;
     // What is held ends for it, so the robot is not driven on while something else runs.
@@ -194,7 +193,7 @@ export class Driving {
       const held = HELD.find(([, word]) => word === name);
       const once = ONCE.find(([, word]) => word === name);
       if (held) this.heldButton(pad, ...held);
-      else addButton(pad, name, once[2]).addEventListener("click", () => this.once(`drive ${once[0]} 1000`));
+      else addButton(pad, name, once[2]).addEventListener("click", () => this.once(`drive ${once[0]}`));
     }
     for (const [code, word, keys] of STEPS) {
       addButton(arm, word, keys).addEventListener("click", () => this.once(`arm ${code}`));
@@ -234,7 +233,7 @@ export class Driving {
       event.preventDefault();
       if (event.repeat) return;
       if (held) this.hold(held[0], place(event));
-      else if (once) this.once(`drive ${once[0]} 1000`);
+      else if (once) this.once(`drive ${once[0]}`);
       else this.once(`arm ${step[0]}`);
     });
     addEventListener("keyup", (event) => this.release(place(event)));

@@ -9,3 +9,9 @@ addEventListener("keydown", (event) => {
   const stop = document.querySelector("#stop");
   stop?.form.requestSubmit(stop);
 }, { capture: true });
+
+// The form says who presses, if the person at this browser has chosen a name (`link.js`).
+addEventListener("formdata", ({ formData }) => {
+  const name = localStorage.getItem("name");
+  if (name) formData.set("name", name);
+});

@@ -2,7 +2,7 @@
 // control that follows it.
 
 import { judge, wrong } from "./fields.js";
-import { reason } from "./reasons.js";
+import { reason } from "./sentences.js";
 import { SENSORS, sensors } from "./strips.js";
 import { put, say } from "./words.js";
 

@@ -8,7 +8,7 @@
 //   from <robot> <a line of the extension, such as state ...>
 //   from <robot> asked <who> <what>   a person here wants an action, stop, take or free
 //   past <robot> <ms> <an event, a thought or what was asked so long ago>
-//   answer <number> done [<text>] | refused <reason> | stopped <ms> | lost <reason>
+//   answer <number> done [<reason>{; <reason>}] | refused <reason> | stopped <ms> | lost <reason>
 //
 // What the page says:
 //
@@ -32,7 +32,7 @@ export const SPAN_MS = 60_000;
 /** How often the page says that it is there, in ms. */
 const HERE_MS = 1_000;
 /** Said where the panel no longer knows the browser: `up` was started anew, or the cookie is gone. */
-const NO_TOKEN = "this page has no token; open the address that `lager up` or `lager station` has printed";
+const NO_TOKEN = "no_token";
 const RETRY_MS = [250, 500, 1_000, 2_000];
 
 /** What is known of one robot. */
@@ -120,6 +120,7 @@ export class Link extends EventTarget {
     const url = new URL("live", location.href);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
     url.hash = "";
+    url.search = new URLSearchParams(localStorage.getItem("name") ? { name: localStorage.getItem("name") } : {});
     const socket = new WebSocket(url);
     this.socket = socket;
     socket.onopen = () => {
@@ -144,6 +145,12 @@ export class Link extends EventTarget {
       const wait = RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)];
       setTimeout(() => this.connect(), wait);
     };
+  }
+
+  /** The person at this page is called so from now on; the station is told by a new connection. */
+  rename(name) {
+    localStorage.setItem("name", name);
+    this.socket.close();
   }
 
   /** A browser does not say why a socket was refused; the page's own address does. */
@@ -283,6 +290,8 @@ export class Link extends EventTarget {
       });
     } else if (word === "thinks") {
       robot.thinks = fields(rest);
+    } else if (word === "because") {
+      robot.thinks = { because: rest.join(" ") };
     } else if (word === "event" || word === "thought" || word === "asked") {
       // A thought's values come right before it.
       const values = word === "thought" ? robot.thinks : null;
@@ -312,7 +321,7 @@ function pairs(list, word, index) {
 }
 
 /** How fast it is at most for each unit of duty, in mm/s: 73 at a duty of 104 is usual, with room above. */
-const MM_PER_DUTY = 1;
+export const MM_PER_DUTY = 1;
 
 /** Keeps where it was, and how far its wheels may have taken it since nobody knows. */
 function stray(robot, { x_mm: x, y_mm: y, heading_deg: heading = 0, unsure_mm: unsure = 0, left_duty: left = 0, right_duty: right = 0 }, now) {

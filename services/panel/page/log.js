@@ -3,8 +3,7 @@
 import { clock, current, put, say, span } from "./words.js";
 import { mcap } from "./mcap.js";
 import { fill, item } from "./missions.js";
-import { reason } from "./reasons.js";
-import { crossing, sentence, thought } from "./sentences.js";
+import { PLAIN, called, crossing, reason, sentence, thought } from "./sentences.js";
 
 /** How long ago what is saved may be, in ms. */
 const KEPT_MS = 600_000;
@@ -95,7 +94,7 @@ function figures({ at, wall, ...figures }) {
 function line({ at, kind, words, values }) {
   const time = clock(at);
   if (kind === "refused") return `${time}  ${say("blocked", reason(words[0]))}`;
-  if (kind === "thought") return `${time}  ${(values && thought(values)) ?? reason(words.join(" "))}`;
+  if (kind === "thought") return `${time}  ${(values && thought(values)) ?? words.join(" ")}`;
   if (kind === "asked") return `${time}  ${asked(words)}`;
   const [what, x, y, , product, ...more] = words;
   return `${time}  ${say(`event_${what}`, product, crossing(`${x},${y}`), ...about(what, more))}`;
@@ -106,13 +105,16 @@ const BY = { comm: "by_comm", operator: "by_operator" };
 
 /** What an event is about besides its place and its goods. */
 function about(what, [first, second]) {
-  if (what === "stopped") return [sentence(`stop_cause_${first}`) || "\u2013", BY[second] ? say(BY[second]) : second];
+  if (what === "stopped") return [(first !== "none" && sentence(`stop_cause_${first}`)) || "\u2013", BY[second] ? say(BY[second]) : second];
   if (what === "mode") return [say(`mode_${first}`)];
   return [first];
 }
 
 /** Who at a page has asked for what. */
-function asked([who, what, first, ...more]) {
+function asked([name, what, first, ...more]) {
+  const who = called(name);
   const of = { mode: () => say(`mode_${first}`), order: () => more[0], resume: () => "", obstacle: () => more.slice(0, 2).join(", ") };
+  // What takes no words is called as its button is.
+  if (PLAIN.includes(what)) return `${who}: ${[sentence(`do_${what}`), first].filter(Boolean).join(" ")}`;
   return say(`did_${what}${what === "obstacle" ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
 }

@@ -5,13 +5,14 @@ import { Asked, Where } from "./ask.js";
 import { Bar } from "./bar.js";
 import { choose, named, shown } from "./chosen.js";
 import { Driving } from "./drive.js";
+import { Fleet } from "./fleet.js";
 import { ByHand } from "./hand.js";
 import { Line } from "./line.js";
 import { Link } from "./link.js";
 import { Log } from "./log.js";
 import { WarehouseMap } from "./map.js";
 import { Missions } from "./missions.js";
-import { reason } from "./reasons.js";
+import { called, reason } from "./sentences.js";
 import { Setup } from "./setup.js";
 import { Strips } from "./strips.js";
 import { change, current, put, say, translate } from "./words.js";
@@ -25,16 +26,16 @@ const link = new Link();
 const robot = () => shown(link);
 
 const bar = new Bar(link, {
-  link: at("link"), linkSaid: at("link-said"), mode: at("mode"), driver: at("driver"), battery: at("battery"), doing: at("doing"),
-  form: at("stop-place"), stop: at("stop"), stopSaid: at("stop-said"), stopWhom: at("stop-whom"), stopAll: at("stop-all"),
-  halt: at("halt"), haltSaid: at("halt-said"), haltThen: at("halt-then"), resume: at("resume"),
+  link: at("link"), mode: at("mode"), driver: at("driver"), battery: at("battery"), told: at("told"),
+  form: at("stop-place"), stop: at("stop"), stopSaid: at("stop-said"), stopAll: at("stop-all"),
+  resumePlace: at("resume-place"), resume: at("resume"), resumeThen: at("resume-then"),
 }, robot, [
   { button: at("resume"), said: at("resume-said") },
   { button: at("drive-resume"), said: at("drive-resume-said") },
 ]);
 const map = new WarehouseMap(at("map"), at("map-text"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow"), isArmed: () => at("armed").checked }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
 const missions = new Missions(link, {
-  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"), undo: at("queue-undo"),
+  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), plain: at("plain"), clear: at("clear"), undo: at("queue-undo"),
   said: at("missions-said"), queue: at("queue"), history: at("history"),
 }, robot);
 const arm = new Arm(at("arm-drawing"));
@@ -50,6 +51,10 @@ const line = new Line({
   gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), said: at("board-said"),
   calibrate: at("calibrate"), steps: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"),
 }, link, robot);
+const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, (name) => {
+  at("robot").value = name;
+  at("robot").onchange();
+});
 const strips = new Strips(at("strips"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), csv: at("save-csv"), mcap: at("save-mcap") }, robot);
 
@@ -100,10 +105,17 @@ at("control").onclick = async () => {
   if (!shown) return;
   const mine = shown.driver === link.me;
   driving.letGo();
-  driving.tell(...(shown.driver && !mine ? ["asked_for", shown.driver] : [null]));
+  driving.tell(...(shown.driver && !mine ? ["asked_for", called(shown.driver)] : [null]));
   const answer = await link.ask(mine ? "free" : "take", shown.name);
   driving.tell(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
   if (mine && answer.done && where.isOpen(shown)) where.ask();
+};
+at("name").value = localStorage.getItem("name") ?? "";
+at("name").onchange = () => {
+  driving.letGo();
+  // It stands in lines of words.
+  at("name").value = at("name").value.trim().replaceAll(" ", "-");
+  link.rename(at("name").value);
 };
 at("language").onclick = () => {
   change();
@@ -119,7 +131,7 @@ for (const box of document.querySelectorAll("[type=checkbox]")) {
 for (const tab of document.querySelectorAll("[role=tab]")) {
   tab.addEventListener("click", () => show(tab));
   tab.addEventListener("keydown", (event) => {
-    const tabs = [...document.querySelectorAll("[role=tab]")];
+    const tabs = [...document.querySelectorAll("[role=tab]:not([hidden])")];
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step || at("armed").checked) return;
     const next = tabs[(tabs.indexOf(tab) + step + tabs.length) % tabs.length];
@@ -141,7 +153,6 @@ function show(tab) {
 /** Words that change with the language or with who looks. */
 function words() {
   at("language").textContent = say("language");
-  put(at("stop-word"), say("stop"));
   for (const element of document.querySelectorAll(".driver-only")) element.disabled = !link.mayDrive;
 }
 
@@ -209,8 +220,9 @@ function picture() {
 }
 
 function drawRest(shown, time) {
-  bar.draw(shown, time);
-  map.draw(shown, time);
+  map.draw(shown, time, bar.draw(shown, time));
+  map.drawOthers([...link.robots.values()].filter((other) => other !== shown), time);
+  fleet.draw(shown, time);
   missions.draw(shown, time);
   arm.draw(shown);
   driving.draw();
@@ -220,7 +232,7 @@ function drawRest(shown, time) {
   byHand.draw(shown);
   log.draw(shown);
   const mine = shown?.driver && shown.driver === link.me;
-  const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", shown.driver] : ["control_free"];
+  const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", called(shown.driver)] : ["control_free"];
   put(at("control"), say(...seat));
   // Who has the wheel is not known until the robot is heard again.
   at("control").disabled = !link.open || !shown?.connected;

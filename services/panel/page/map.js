@@ -1,6 +1,6 @@
 // The warehouse and the robots in it, as one drawing in mm that is panned and zoomed by its view box.
 
-import { SPAN_MS } from "./link.js";
+import { MM_PER_DUTY, SPAN_MS } from "./link.js";
 import { crossing } from "./sentences.js";
 import { put, say } from "./words.js";
 
@@ -51,13 +51,18 @@ export class WarehouseMap {
     this.ways = make("g", {}, svg);
     this.trail = make("g", { class: "trail" }, svg);
     for (let step = 0; step < TRAIL; step++) make("polyline", { opacity: (0.5 * (TRAIL - step)) / TRAIL }, this.trail);
+    this.gap = make("polyline", { class: "gap" }, svg);
     this.route = make("polyline", { class: "route" }, svg);
     this.next = make("circle", { class: "next", r: 70 }, svg);
     this.unsure = make("circle", { class: "unsure" }, svg);
     this.ghost = robotShape(svg, "ghost");
     this.cross = make("path", { class: "cross", d: "M-60 0H60M0 -60V60" }, svg);
+    this.others = make("g", {}, svg);
     this.body = robotShape(svg, "robot");
-    this.lost = make("text", { class: "lost" }, svg);
+    this.chip = make("g", { class: "chip" }, svg);
+    make("rect", {}, this.chip);
+    make("text", {}, this.chip);
+    this.state = null;
     this.shown = null;
     this.pan();
     tools.zoomIn.onclick = () => this.zoom(0.8);
@@ -82,6 +87,14 @@ export class WarehouseMap {
     if (!warehouse) return;
     this.side = warehouse.side_length_cm * 10;
     const [width, height] = warehouse.size;
+    const [wide, high, beyond, inside] = [width * this.side, height * this.side, 130, 84];
+    make("rect", { class: "floor", x: -beyond, y: -high - beyond, width: wide + 2 * beyond, height: high + 2 * beyond }, this.floor);
+    for (let x = 0; x < width; x++) {
+      for (let y = 1; y <= height; y++) {
+        const length = this.side - 2 * inside;
+        make("rect", { class: "rack", x: x * this.side + inside, y: inside - y * this.side, width: length, height: length }, this.floor);
+      }
+    }
     for (let x = 0; x <= width; x++) this.tape(x, 0, x, height);
     for (let y = 0; y <= height; y++) this.tape(0, y, width, y);
     this.exit();
@@ -179,9 +192,8 @@ export class WarehouseMap {
     const isKnown = robot?.state.x_mm !== undefined;
     const shown = isKnown || Boolean(robot?.pose);
     for (const part of [this.body, this.unsure, this.trail]) part.toggleAttribute("hidden", !shown);
-    for (const part of [this.route, this.next]) part.toggleAttribute("hidden", !isKnown);
-    this.lost.toggleAttribute("hidden", isKnown || !robot?.state.phase);
-    if (robot && !isKnown) this.sayLost(robot.pose);
+    for (const part of [this.gap, this.route, this.next]) part.toggleAttribute("hidden", !isKnown);
+    this.sayState(robot, isKnown);
     this.ghost.toggleAttribute("hidden", !robot?.truth);
     const stale = !robot || robot.isStale(now);
     this.svg.classList.toggle("stale", stale);
@@ -195,22 +207,34 @@ export class WarehouseMap {
     // Where the axle may be: as wide as odometry is wrong until the next mark, and as it was driven by hand since.
     set(this.unsure, "cx", Math.round(pose.x));
     set(this.unsure, "cy", Math.round(-pose.y));
-    set(this.unsure, "r", Math.round(unsure + robot.strayed + (isKnown ? 0 : BODY.front)));
+    const since = stale ? unheardMm(robot, now) : 0;
+    set(this.unsure, "r", Math.round(unsure + robot.strayed + since + (isKnown ? 0 : BODY.front)));
     if (this.following) this.centre(pose.x, -pose.y);
   }
 
-  /** That nobody knows where it is: where it was last, or, for who has not seen it, over the map. */
-  sayLost(pose) {
-    const size = this.warehouse ? this.letters * 1.4 : 80;
+  /** Its state at the robot: where it is or was last or, for who has not seen it, over the map. */
+  sayState(robot, isKnown) {
+    const { look, chip } = this.state ?? {};
+    const words = [chip, look !== "lost" && robot?.state.phase && !isKnown && say("place_unknown")].filter(Boolean).join(", ");
+    this.chip.toggleAttribute("hidden", !words);
+    if (!words) return;
+    const size = this.warehouse ? this.letters : 80;
     const [left, top, width] = this.view;
-    put(this.lost, say("place_unknown"));
-    set(this.lost, "font-size", size);
-    set(this.lost, "x", Math.round(pose?.x ?? left + width / 2));
-    set(this.lost, "y", Math.round(pose ? -pose.y - BODY.front - 60 : top + 1.5 * size));
+    const { pose } = robot;
+    const [x, y] = [pose?.x ?? left + width / 2, pose ? -pose.y + BODY.front + size : top + 1.5 * size];
+    const [box, text] = this.chip.children;
+    if (text.textContent !== words || text.getAttribute("font-size") !== String(size)) {
+      put(text, words);
+      set(text, "font-size", size);
+      const long = text.getComputedTextLength() + size;
+      for (const [key, value] of Object.entries({ x: -long / 2, y: -size * 1.1, width: long, height: size * 1.6, rx: size / 5 })) set(box, key, value);
+    }
+    set(this.chip, "transform", `translate(${Math.round(x)} ${Math.round(y)})`);
   }
 
-  /** Draws what changes now and then: ways and goods. */
-  draw(robot, now) {
+  /** Draws what changes now and then: ways, goods and the robot's state. */
+  draw(robot, now, state) {
+    this.state = state;
     put(this.words, this.describe(robot));
     if (!robot) return;
     this.drawPlaced(robot);
@@ -219,6 +243,27 @@ export class WarehouseMap {
     if (robot.state.x_mm === undefined || !this.shown) return;
     this.drawTrail(robot, now);
     this.drawWay(robot, this.shown);
+  }
+
+  /** The other robots of the station, each with its name. */
+  drawOthers(robots, now) {
+    for (const robot of robots.filter(({ pose }) => pose)) {
+      let other = [...this.others.children].find(({ dataset }) => dataset.robot === robot.name);
+      if (!other) {
+        other = make("g", { class: "other", "data-robot": robot.name }, this.others);
+        robotShape(other, "robot").removeAttribute("hidden");
+        make("text", {}, other, robot.name);
+      }
+      const [body, name] = other.children;
+      const pose = this.onWayOut(robot.pose);
+      place(body, pose);
+      for (const [key, value] of Object.entries({ x: Math.round(pose.x), y: Math.round(-pose.y - BODY.front - 20), "font-size": this.warehouse ? this.letters : 80 })) set(name, key, value);
+      other.classList.toggle("stale", robot.isStale(now));
+      other.classList.toggle("stopped", robot.state.stopped === "1");
+      other.classList.toggle("lost", robot.state.x_mm === undefined);
+    }
+    const names = robots.map(({ name }) => name);
+    for (const other of this.others.children) other.toggleAttribute("hidden", !names.includes(other.dataset.robot));
   }
 
   /** The picture for somebody who does not see it. */
@@ -276,7 +321,7 @@ export class WarehouseMap {
 
   drawWay(robot, pose) {
     const nodes = robot.route.map(([x, y]) => `${x * this.side},${-y * this.side}`);
-    set(this.route, "points", [`${Math.round(pose.x)},${Math.round(-pose.y)}`, ...nodes].join(" "));
+    for (const line of [this.gap, this.route]) set(line, "points", [`${Math.round(pose.x)},${Math.round(-pose.y)}`, ...nodes].join(" "));
     const next = robot.state.next?.split(",").map(Number);
     this.next.toggleAttribute("hidden", !next);
     if (next) {
@@ -477,9 +522,25 @@ function robotShape(svg, name) {
   // It looks up at 0 degrees.
   make("path", { d: `M${-half} ${rear}V${-front + 50}L${-half + 50} ${-front}H${half - 50}L${half} ${-front + 50}V${rear}Z` }, group);
   make("path", { class: "arrow", d: `M0 ${-front + 25}l45 70h-90z` }, group);
-  // Two bars, while it is stopped.
-  make("path", { class: "bars", d: `M-45 -70h30v120h-30zM15 -70h30v120h-30z` }, group);
+  // Hatched, while it is stopped.
+  make("path", { class: "hatch", d: hatch() }, group);
   return group;
+}
+
+/** Lines across the body, from its left edge up to the right. */
+function hatch() {
+  const [half, front, rear] = [BODY.half - 8, BODY.front - 45, BODY.rear - 8];
+  let path = "";
+  for (let from = rear + 2 * half - 30; from > -front - 2 * half; from -= 55) {
+    const [low, high] = [Math.max(0, from - rear), Math.min(2 * half, from + front)];
+    if (low < high) path += `M${low - half} ${from - low}L${high - half} ${from - high}`;
+  }
+  return path;
+}
+
+/** How far a robot that is not heard may have driven at its last speed, in mm. */
+function unheardMm({ state: { left_duty: left = 0, right_duty: right = 0 }, stated }, now) {
+  return Math.max(Number(left), Number(right)) * MM_PER_DUTY * Math.min(Math.max(0, now - stated) / 1_000, 60);
 }
 
 function place(group, { x, y, heading }) {

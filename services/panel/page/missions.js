@@ -1,7 +1,6 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
-import { reason } from "./reasons.js";
-import { crossing, sentence } from "./sentences.js";
+import { PLAIN, crossing, reason, sentence } from "./sentences.js";
 import { clock, put, say, span } from "./words.js";
 
 /** Whoever orders the same goods again within this time has clicked twice, or holds Enter. */
@@ -35,6 +34,12 @@ export class Missions {
     parts.pickedForce.onclick = () => this.act("picked force");
     parts.clear.onclick = () => this.takeBack("clear", waiting(this.robot()));
     parts.undo.onclick = () => this.undo();
+    this.plain = PLAIN.map((action) => {
+      const button = Object.assign(document.createElement("button"), { type: "button", id: `do-${action}` });
+      button.onclick = () => this.act(action);
+      return button;
+    });
+    parts.plain.append(...this.plain);
     link.addEventListener("event", ({ detail }) => this.remember(detail));
   }
 
@@ -105,6 +110,10 @@ export class Missions {
   draw(robot, now) {
     this.drawQueue(robot);
     const { picks, undo } = this.parts;
+    this.plain.forEach((button, at) => {
+      put(button, sentence(`do_${PLAIN[at]}`));
+      button.disabled = !this.link.mayDrive;
+    });
     undo.hidden = !this.taken || this.taken.robot !== robot;
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";

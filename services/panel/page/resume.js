@@ -1,6 +1,6 @@
 // Resume is held, so that nobody does it in passing. Each press ends in a resume or in a word why not.
 
-import { reason } from "./reasons.js";
+import { called, reason } from "./sentences.js";
 import { put, say } from "./words.js";
 
 /** How long it is held, in ms. */
@@ -73,7 +73,7 @@ export class Resume {
   /** Why this page may not end the stop, as words; null if it may. */
   forbidden(robot) {
     if (!this.link.mayDrive) return ["viewer"];
-    return robot.driver && robot.driver !== this.link.me ? ["person", robot.driver] : null;
+    return robot.driver && robot.driver !== this.link.me ? ["person", called(robot.driver)] : null;
   }
 
   /** What is in the way for a moment, likewise. */

@@ -1,14 +1,11 @@
 // Setting up: the warehouse by form, file and strings, with checks as one types.
 
 import { judge, wrong } from "./fields.js";
-import { reason } from "./reasons.js";
+import { reason } from "./sentences.js";
+import { LIMITS } from "./table.js";
 import { put, say, translate } from "./words.js";
 
 const SIDES = ["left", "up", "right", "down"];
-/** What a robot can drive in (services/logic/src/map.rs): crossings along a side, cm of a square, goods. */
-const MOST_CROSSINGS = 100;
-const LEAST_SIDE_CM = 40;
-const MOST_GOODS = 256;
 
 export class Setup {
   constructor(link, parts) {
@@ -17,6 +14,9 @@ export class Setup {
     this.past = [];
     this.dirty = false;
     const { form } = parts;
+    const { width, height, side } = form.elements;
+    width.max = height.max = LIMITS.squares;
+    [side.min, side.max] = [LIMITS.leastSideCm, LIMITS.mostSideCm];
     judge(form);
     form.addEventListener("input", ({ target }) => {
       // What is pasted or loaded replaces the form's content as a whole.
@@ -201,9 +201,9 @@ export class Setup {
   /** What is wrong with a warehouse, as a sentence; the station checks it, too. */
   wrong({ size = [], side_length_cm: side, product }) {
     const largest = Math.max(...size);
-    if (largest >= MOST_CROSSINGS) return say("size_limits", MOST_CROSSINGS - 1, largest);
-    if (side < LEAST_SIDE_CM) return say("side_limits", LEAST_SIDE_CM, side);
-    if (product.length > MOST_GOODS) return say("goods_limits", MOST_GOODS, product.length);
+    if (largest > LIMITS.squares) return say("size_limits", LIMITS.squares, largest);
+    if (side < LIMITS.leastSideCm || side > LIMITS.mostSideCm) return say("side_limits", LIMITS.leastSideCm, side, LIMITS.mostSideCm);
+    if (product.length > LIMITS.goods) return say("goods_limits", LIMITS.goods, product.length);
     const ids = product.map(({ id }) => id);
     const twice = ids.find((id, index) => ids.indexOf(id) !== index);
     if (twice !== undefined) return say("duplicate", twice);

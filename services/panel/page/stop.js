@@ -5,7 +5,7 @@
 //
 // Before this runs the form is the browser's, and is answered by a page (services/panel/src/stop.rs).
 
-import { reason } from "./reasons.js";
+import { reason, sentence } from "./sentences.js";
 import { say } from "./words.js";
 
 /** Whether a person writes there: Space is a blank then. */
@@ -19,9 +19,6 @@ const CONFIRM_MS = 1_000;
 const FORM_MS = 5_000;
 /** A click ends a press that has stopped already, unless that was so long ago. */
 const PRESS_MS = 1_000;
-
-/** The words of the form's answer. */
-const BECAME = { stands: "stands_of", sent: "sent_to", unconfirmed: "unconfirmed_of", unheard: "unheard_of", unknown: "stop_not_here" };
 
 export class Stop {
   /**
@@ -77,11 +74,11 @@ export class Stop {
     const unconfirmed = setTimeout(() => this.post([robot.name], "stop_unconfirmed"), CONFIRM_MS);
     const answer = await this.link.ask("stop", robot.name);
     clearTimeout(unconfirmed);
-    if (answer.stopped !== undefined) this.say("stands", answer.stopped);
-    else if (answer.done) this.say("sent_to", robot.name);
+    if (answer.stopped !== undefined) this.became(robot.name, "stands", answer.stopped);
+    else if (answer.done) this.became(robot.name, "sent");
     else if (answer.unsent) this.post([robot.name]);
     else if (answer.isUnknown) this.say("stop_unconfirmed");
-    else if (!robot.connected) this.say("unheard_of", robot.name);
+    else if (!robot.connected) this.became(robot.name, "unheard");
     else this.say("stop_refused", reason(answer.refused));
   }
 
@@ -95,18 +92,22 @@ export class Stop {
   /** The form by a request; without a name all are stopped. Until there is an answer `meanwhile` is said. */
   async post(names, meanwhile = "sent") {
     this.say(meanwhile);
-    const body = new URLSearchParams(names.map((name) => ["robot", name ?? ""]));
+    const body = new URLSearchParams([["name", localStorage.getItem("name") ?? ""], ...names.map((name) => ["robot", name ?? ""])]);
     let lines;
     try {
       const answer = await fetch("/stop", { method: "POST", body, headers: { accept: "text/plain" }, signal: AbortSignal.timeout(FORM_MS) });
-      if (!answer.ok) return this.tell(say("stop_refused", reason((await answer.text()).split("\n")[0])));
+      if (!answer.ok) return this.tell(say("stop_refused", (await answer.text()).split("\n")[0]));
       lines = (await answer.text()).split("\n").filter(Boolean);
     } catch (error) {
       // One that nobody answers may have arrived.
       return this.say(error.name === "TimeoutError" ? "stop_unconfirmed" : "stop_lost");
     }
-    const words = lines.map((line) => line.split(" ")).map(([robot, word, ms]) => say(BECAME[word] ?? word, robot, ms));
+    const words = lines.map((line) => became(...line.split(" ")));
     this.tell(words.join(". ") || say("no_robot"));
+  }
+
+  became(robot, word, ms) {
+    this.tell(became(robot, word, ms));
   }
 
   say(key, ...values) {
@@ -117,3 +118,6 @@ export class Stop {
     this.said.textContent = text;
   }
 }
+
+/** What became of a robot's stop, by the words of the panel. */
+const became = (robot, word, ms) => sentence(`became_${word}`, { robot, ms }) ?? word;

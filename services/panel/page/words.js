@@ -1,6 +1,9 @@
-// Every word that the page shows, in Swedish and English. A test holds both to the same keys.
+// Every word that the page shows, in Swedish and English. A test holds both to the same keys. What is not here
+// stands in the table of sentences (bus/orders/sentences.txt).
 
-const TABLE = {
+import { TABLE } from "./table.js";
+
+const WORDS = {
   en: {
     add_product: "Add goods", age: "last heard {0} ago", arm: "Arm", arm_waits: "The robot drives: stop it first, then move the arm.",
     armed: "Armed to drive", autonomous: "Autonomous", backward: "back", battery: "battery",
@@ -16,10 +19,10 @@ const TABLE = {
     fetch: "Fetch", fetches: "fetches {0}", filter: "filter", fit: "Fit", follow: "Follow", follow_back: "follow line back",
     follow_forward: "follow line", forward: "forward", full: "wait: the link does not keep up", gains: "Line control", gains_now: "now {0} and {1}", gains_unset: "as the board has them", put_back: "Put back {0} and {1}", goods: "goods", goods_string: "Goods as a string", goods_string_how: "write number,x,y,side with semicolons between, side 0 left, 1 up, 2 right, 3 down; this is not: {0}",
     history: "Delivered", history_empty: "Nothing yet.", in: "in", language: "Svenska", left: "left", left_diag: "45° left",
-    load_file: "Load a file", map_string: "Map as a string", map_string_how: "write four numbers: squares in x and y, then the delivery corner, such as 4,3,0,3", no_warehouse: "this is no warehouse", no_way: "no way there", line: "Line", line_error: "line error", line_sensors: "line sensors", link: "link {0} ms", log: "Log", lost: "there is no connection to the station",
+    load_file: "Load a file", map_string: "Map as a string", map_string_how: "write four numbers: squares in x and y, then the delivery corner, such as 4,3,0,3", no_warehouse: "this is no warehouse", no_way: "no way there", line: "Line", line_error: "line error", line_sensors: "line sensors", log: "Log", lost: "there is no connection to the station",
     log_empty: "Nothing that fits has happened.", losses: "lost", manual: "By hand", map: "map", missions: "Missions", mode_autonomous: "AUTONOMOUS", mode_manual: "BY HAND",
-    name: "name", no_link: "no link, {0}", no_map: "The station knows no warehouse yet. Describe one under Set up.",
-    no_robot: "No robot has connected yet. It does so by itself once it is up.", not_armed: "tick “{0}” first", not_driver: "take the wheel first",
+    name: "name", no_map: "The station knows no warehouse yet. Describe one under Set up.",
+    no_robot: "No robot has connected yet. It does so by itself once it is up.", not_armed: "tick “{0}” first",
     nobody: "nobody drives", number: "number", obstacle_put: "obstacle put; click again to take it away", obstacle_taken: "obstacle taken away",
     old: "what is shown is old", out: "out", outside: "goods {0} stand outside", path: "path p50 / p99", person: "{0} drives", picked: "Pick-up done",
     picked_force: "Pick-up done, not felt", picks: "The robot picks goods up by itself", plain: "speaks only the document's language: no live picture",
@@ -28,9 +31,9 @@ const TABLE = {
     save: "Save", save_csv: "Save CSV {0}", save_file: "Save as a file", save_mcap: "Save MCAP {0}", saved: "saved", sent: "sent", servo_base: "base", servo_shoulder: "shoulder", servo_elbow: "elbow", servo_wrist: "wrist", servo_rotation: "rotation", servo_claw: "claw", servo_load: "load {0} %",
     servo_voltage: "input voltage", servo_angle: "angle limit", servo_heat: "too hot", servo_range: "value out of range", servo_checksum: "checksum", servo_overload: "overload", servo_instruction: "unknown instruction",
     set: "Set", setup: "Set up",
-    side: "Side", size: "Squares", square: "square", squeeze: "squeeze", stale: "nothing new for {0}", stand: "stand", stands: "both wheels stand, {0} ms",
+    side: "Side", size: "Squares", square: "square", squeeze: "squeeze", stand: "stand",
     stop: "STOP", stop_lost: "NOT SENT: there is no connection to the station", stop_unconfirmed: "sent, not confirmed: the robot may still be moving",
-    stopped: "STOPPED {0} ago{1}", stopped_short: "STOPPED", strips: "the last minute", station_drives: "the robot drives itself", under_way: "under way", undo: "Undo", unheard: "never heard",
+    stopped_short: "STOPPED", strips: "the last minute", station_drives: "itself", under_way: "under way", undo: "Undo", unheard: "never heard",
     up: "up", viewer: "you may look and stop", wait: "one at a time: a step is under way", where: "Say where it stands", zoom_in: "zoom in", zoom_out: "zoom out",
     asks: "{0} asks for the wheel.", asked_for: "{0} has been asked for the wheel", hand_over: "Hand over", keep: "Keep it", board_sensor: "the sensor board",
     board_steering: "the steering board", stop_refused: "NOT SENT: {0}", stopped_elsewhere: "STOPPED: {0}",
@@ -43,13 +46,13 @@ const TABLE = {
     did_stop: "{0} stops it", did_resume: "{0} releases the stop", did_mode: "{0} makes it {1}", did_take: "{0} takes the wheel", did_free: "{0} leaves the wheel", did_order: "{0} orders {1}", did_cancel: "{0} cancels order {1}",
     did_first: "{0} puts order {1} first", did_up: "{0} moves order {1} up", did_clear: "{0} clears the queue", did_reset: "{0} says that it stands at the delivery", did_place: "{0} says that it stands at {1}", did_pick: "{0} changes who picks: {1}",
     did_picked: "{0} says that the goods are picked up", did_gains: "{0} sets the line control to {1}", did_calibrate: "{0} calibrates", did_obstacle_put: "{0} puts an obstacle at {1}", did_obstacle_take: "{0} takes away the obstacle at {1}",
-    field_range: "{0}: a number from {1} to {2}", field_least: "{0}: a number from {1} up", stands_of: "{0} stands after {1} ms", sent_to: "sent to {0}, which confirms nothing",
-    unconfirmed_of: "sent to {0}, not confirmed: it may still be moving", unheard_of: "NOT SENT: {0} is not heard", stop_not_here: "NOT SENT: {0} is not here", not_here: "{0} is not here", stop_all: "Stop all",
+    field_range: "{0}: a number from {1} to {2}", field_least: "{0}: a number from {1} up",
+    fleet: "Robots", orders_wait: "waiting orders: {0}", not_here: "{0} is not here", stop_all: "Stop all",
     hold_longer: "hold it for a second", stopped_again: "it was stopped again meanwhile", still_moves: "it still moves", was_to_fetch: "was to fetch {0}", then_stands: "Released, it stands until somebody drives it.",
     then_needs: "Released, it still needs what is said above.", then_waits: "Released, it waits for an order.", then_fetches: "Released, it goes on by itself: it fetches {0}.",
     hand_asked: "The robot is fetching {0}. It is taken by hand in {1} s.", hand_now: "By hand now", hand_leave: "Leave it to the robot",
     place_unknown: "place unknown", placed: "obstacle that stands there", found: "found blocked", legend: "bar: an obstacle stands there; cross: found blocked", text_placed: "Obstacles stand at: {0}.",
-    side_limits: "the robot drives in squares of {0} cm or more; these are {1} cm", size_limits: "the robot knows up to {0} squares along a side; here are {1}", goods_limits: "the robot knows up to {0} goods; here are {1}",
+    side_limits: "the robot drives in squares of {0} to {2} cm; these are {1} cm", size_limits: "the robot knows up to {0} squares along a side; here are {1}", goods_limits: "the robot knows up to {0} goods; here are {1}",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -66,10 +69,10 @@ const TABLE = {
     fetch: "Hämta", fetches: "hämtar {0}", filter: "filter", fit: "Allt", follow: "Följ", follow_back: "följ linje bakåt",
     follow_forward: "följ linje", forward: "framåt", full: "vänta: länken hinner inte med", gains: "Linjereglering", gains_now: "nu {0} och {1}", gains_unset: "som kortet har dem", put_back: "Återställ {0} och {1}", goods: "varor", goods_string: "Varor som sträng", goods_string_how: "skriv nummer,x,y,sida med semikolon emellan, sida 0 vänster, 1 upp, 2 höger, 3 ner; detta är det inte: {0}",
     history: "Levererat", history_empty: "Inget ännu.", in: "in", language: "English", left: "vänster", left_diag: "45° vänster",
-    load_file: "Läs in fil", map_string: "Karta som sträng", map_string_how: "skriv fyra tal: rutor i x och y, sedan leveranshörnet, som 4,3,0,3", no_warehouse: "detta är inget lager", no_way: "ingen väg dit", line: "Linje", line_error: "linjefel", line_sensors: "linjesensorer", link: "länk {0} ms", log: "Logg", lost: "ingen förbindelse med stationen",
+    load_file: "Läs in fil", map_string: "Karta som sträng", map_string_how: "skriv fyra tal: rutor i x och y, sedan leveranshörnet, som 4,3,0,3", no_warehouse: "detta är inget lager", no_way: "ingen väg dit", line: "Linje", line_error: "linjefel", line_sensors: "linjesensorer", log: "Logg", lost: "ingen förbindelse med stationen",
     log_empty: "Inget sådant har hänt.", losses: "förlorat", manual: "För hand", map: "karta", missions: "Uppdrag", mode_autonomous: "AUTONOM", mode_manual: "FÖR HAND",
-    name: "namn", no_link: "ingen länk, {0}", no_map: "Stationen känner inget lager än. Beskriv ett under Ställ in.",
-    no_robot: "Ingen robot har anslutit än. Den gör det själv när den är igång.", not_armed: "kryssa i ”{0}” först", not_driver: "ta ratten först",
+    name: "namn", no_map: "Stationen känner inget lager än. Beskriv ett under Ställ in.",
+    no_robot: "Ingen robot har anslutit än. Den gör det själv när den är igång.", not_armed: "kryssa i ”{0}” först",
     nobody: "ingen kör", number: "nummer", obstacle_put: "hinder utställt; klicka igen för att ta bort det", obstacle_taken: "hinder borttaget",
     old: "det som visas är gammalt", out: "ut", outside: "vara {0} står utanför", path: "väg p50 / p99", person: "{0} kör", picked: "Upplockning klar",
     picked_force: "Upplockning klar, känns ej", picks: "Roboten plockar upp varorna själv", plain: "talar bara dokumentets språk: ingen levande bild",
@@ -78,9 +81,9 @@ const TABLE = {
     save: "Spara", save_csv: "Spara CSV {0}", save_file: "Spara som fil", save_mcap: "Spara MCAP {0}", saved: "sparat", sent: "skickat", servo_base: "bas", servo_shoulder: "axel", servo_elbow: "armbåge", servo_wrist: "handled", servo_rotation: "vridning", servo_claw: "klo", servo_load: "last {0} %",
     servo_voltage: "matningsspänning", servo_angle: "vinkelgräns", servo_heat: "för varm", servo_range: "värde utanför området", servo_checksum: "kontrollsumma", servo_overload: "överlast", servo_instruction: "okänd instruktion",
     set: "Sätt", setup: "Ställ in",
-    side: "Sida", size: "Rutor", square: "ruta", squeeze: "kläm", stale: "inget nytt på {0}", stand: "stå", stands: "båda hjulen står, {0} ms",
+    side: "Sida", size: "Rutor", square: "ruta", squeeze: "kläm", stand: "stå",
     stop: "STOPP", stop_lost: "EJ SKICKAT: ingen förbindelse med stationen", stop_unconfirmed: "skickat, ej bekräftat: roboten kan röra sig",
-    stopped: "STOPPAD för {0} sedan{1}", stopped_short: "STOPPAD", strips: "senaste minuten", station_drives: "roboten kör själv", under_way: "på väg", undo: "Ångra", unheard: "aldrig hörd",
+    stopped_short: "STOPPAD", strips: "senaste minuten", station_drives: "själv", under_way: "på väg", undo: "Ångra", unheard: "aldrig hörd",
     up: "upp", viewer: "du får titta och stoppa", wait: "en i taget: ett steg pågår", where: "Säg var den står", zoom_in: "närmare", zoom_out: "längre bort",
     asks: "{0} ber om ratten.", asked_for: "{0} har fått frågan om ratten", hand_over: "Lämna över", keep: "Behåll den", board_sensor: "sensorkortet",
     board_steering: "styrkortet", stop_refused: "EJ SKICKAT: {0}", stopped_elsewhere: "STOPPAD: {0}",
@@ -94,13 +97,13 @@ const TABLE = {
     did_stop: "{0} stoppar den", did_resume: "{0} häver stoppet", did_mode: "{0} gör den {1}", did_take: "{0} tar ratten", did_free: "{0} lämnar ratten", did_order: "{0} beställer {1}", did_cancel: "{0} tar bort order {1}",
     did_first: "{0} lägger order {1} först", did_up: "{0} flyttar upp order {1}", did_clear: "{0} tömmer kön", did_reset: "{0} säger att den står vid leveransen", did_place: "{0} säger att den står vid {1}", did_pick: "{0} ändrar vem som plockar: {1}",
     did_picked: "{0} säger att varan är upplockad", did_gains: "{0} sätter linjeregleringen till {1}", did_calibrate: "{0} kalibrerar", did_obstacle_put: "{0} ställer ut ett hinder vid {1}", did_obstacle_take: "{0} tar bort hindret vid {1}",
-    field_range: "{0}: ett tal från {1} till {2}", field_least: "{0}: ett tal från {1}", stands_of: "{0} står efter {1} ms", sent_to: "skickat till {0}, som inte bekräftar något",
-    unconfirmed_of: "skickat till {0}, ej bekräftat: den kan röra sig", unheard_of: "EJ SKICKAT: {0} hörs inte", stop_not_here: "EJ SKICKAT: {0} finns inte här", not_here: "{0} finns inte här", stop_all: "Stoppa alla",
+    field_range: "{0}: ett tal från {1} till {2}", field_least: "{0}: ett tal från {1}",
+    fleet: "Robotar", orders_wait: "väntande order: {0}", not_here: "{0} finns inte här", stop_all: "Stoppa alla",
     hold_longer: "håll den i en sekund", stopped_again: "den stoppades igen under tiden", still_moves: "den rör sig ännu", was_to_fetch: "skulle hämta {0}", then_stands: "Släppt står den tills någon kör den.",
     then_needs: "Släppt behöver den ändå det som sägs ovan.", then_waits: "Släppt väntar den på en order.", then_fetches: "Släppt fortsätter den själv: den hämtar {0}.",
     hand_asked: "Roboten hämtar {0}. Den tas för hand om {1} s.", hand_now: "För hand nu", hand_leave: "Låt roboten köra",
     place_unknown: "okänd plats", placed: "hinder som står där", found: "funnen spärrad", legend: "balk: ett hinder står där; kryss: funnen spärrad", text_placed: "Hinder står vid: {0}.",
-    side_limits: "roboten kör i rutor om minst {0} cm; dessa är {1} cm", size_limits: "roboten kan högst {0} rutor längs en sida; här är {1}", goods_limits: "roboten kan högst {0} varor; här är {1}",
+    side_limits: "roboten kör i rutor om {0} till {2} cm; dessa är {1} cm", size_limits: "roboten kan högst {0} rutor längs en sida; här är {1}", goods_limits: "roboten kan högst {0} varor; här är {1}",
   },
 };
 
@@ -111,7 +114,7 @@ const root = document.documentElement;
 export function current() {
   if (!root.dataset.language) {
     const kept = localStorage.getItem("language");
-    use(kept in TABLE ? kept : navigator.language.startsWith("sv") ? "sv" : "en");
+    use(kept in WORDS ? kept : navigator.language.startsWith("sv") ? "sv" : "en");
   }
   return root.dataset.language;
 }
@@ -128,7 +131,7 @@ function use(language) {
 
 /** A word or sentence; {0} and so on are filled in. */
 export function say(key, ...values) {
-  const text = TABLE[current()][key] ?? key;
+  const text = WORDS[current()][key] ?? TABLE[key]?.[current()] ?? key;
   return text.replace(/\{(\d)\}/g, (_, index) => values[index] ?? "");
 }
 
@@ -156,7 +159,7 @@ export function translate(part = document) {
   for (const element of part.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
   for (const element of part.querySelectorAll("[data-label]")) {
     element.setAttribute("aria-label", say(element.dataset.label));
-    if (element.type === "search") element.placeholder = say(element.dataset.label);
+    if (element.matches("input[type=search], #name")) element.placeholder = say(element.dataset.label);
   }
   for (const element of part.querySelectorAll("[data-title]")) {
     element.title = say(element.dataset.title);

@@ -1,25 +1,28 @@
-//! Who may open the page, and what he may do there.
+//! Who may open the page, and what this person may do there.
 //!
-//! Other users of this machine can connect even to a panel on loopback, so everybody is asked for a
-//! token, one of two: a viewer's looks and stops, a driver's drives as well. The page's address
-//! carries it once (`http://HOST/?token=...`); from then on a cookie does. Cookies do not tell ports
-//! apart, so the cookie's name does, and two panels of one machine do not take each other's.
+//! Other users of this machine can connect even to a panel on loopback. So the panel asks everybody
+//! for a token. There are two: with the viewer's token a person looks and stops, with the driver's
+//! token a person drives as well. The address of the page carries the token once
+//! (`http://HOST/?token=...`), and a cookie carries it from then on. A browser sends a cookie to
+//! every port of a host. So the port is part of the cookie's name, and two panels on one machine do
+//! not take each other's cookies.
 //!
-//! A page of somebody else must not reach the panel through its reader's browser. So the `Host`
-//! that a browser sends must be an address of this panel and not a name that somebody has pointed
-//! here, and the socket's `Origin` must be that host.
+//! A page of another site must not reach the panel through the browser of somebody who reads it. So
+//! the panel checks the `Host` that the browser sends: it must be an address of this panel, and not
+//! a name that somebody has pointed to this address. The socket's `Origin` must be the same host.
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
 
 use lager_lines::secret::{Secret, hex, random};
+use percent_encoding::percent_decode_str;
 
 /// What somebody may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rank {
     /// Look, and stop.
     Viewer,
-    /// All there is.
+    /// Do everything.
     Driver,
 }
 
@@ -32,12 +35,12 @@ impl Rank {
     }
 }
 
-/// The words that let people in: 128 bits each, in hexadecimal.
+/// The tokens that let people in: 128 bits each, in hexadecimal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tokens {
-    /// Whoever has it may drive.
+    /// A person who has it may drive.
     pub driver: String,
-    /// Whoever has it may look and stop.
+    /// A person who has it may look and stop.
     pub viewer: String,
 }
 
@@ -46,7 +49,7 @@ impl Tokens {
     ///
     /// # Errors
     ///
-    /// When the system has none to give.
+    /// The system cannot give random bytes.
     pub fn random() -> io::Result<Self> {
         Ok(Self {
             driver: hex(&random::<16>()?),
@@ -54,7 +57,7 @@ impl Tokens {
         })
     }
 
-    /// Those that follow from a secret: the same for each panel of the same station.
+    /// Tokens that are made from a secret, so each panel of the same station has the same ones.
     pub fn of(secret: &Secret) -> Self {
         Self {
             driver: secret.word("panel driver"),
@@ -81,7 +84,7 @@ impl Access {
         format!("lager-token-{}", self.address.port())
     }
 
-    /// Whether a browser that asks this host asks this panel.
+    /// Whether a request to this host is for this panel.
     pub(crate) fn is_host(&self, host: &str) -> bool {
         let Some((name, port)) = split_port(host) else {
             return false;
@@ -95,18 +98,18 @@ impl Access {
         let Ok(ip) = name.parse::<IpAddr>() else {
             return false;
         };
-        // A number cannot be pointed anywhere else.
+        // Nobody can point a numeric address to another machine.
         ip == self.address.ip()
             || self.address.ip().is_unspecified()
             || (ip.is_loopback() && self.address.ip().is_loopback())
     }
 
-    /// Whether a page of this origin is one of this panel's, which was asked as `host`.
+    /// Whether a page of this origin belongs to this panel, which was asked as `host`.
     pub(crate) fn is_origin(&self, origin: &str, host: &str) -> bool {
         self.is_host(host) && origin.strip_prefix("http://") == Some(host)
     }
 
-    /// What somebody with this token, or none, may do; `None`: nothing.
+    /// What a person with this token, or without one, may do; `None`: nothing.
     pub(crate) fn rank(&self, token: Option<&str>) -> Option<Rank> {
         let token = token?;
         if is_same(token, &self.tokens.driver) {
@@ -119,7 +122,19 @@ impl Access {
     }
 }
 
-/// `host:port`, the host without the brackets of an IPv6 address; 80 where no port stands.
+/// The name that a person has chosen, as the page says it: letters, digits and `-`, in UTF-8 with the
+/// escapes of an address. `None`: none, or one that could be taken for a guest's or for nobody's.
+pub(crate) fn person(query: &str) -> Option<String> {
+    let name = query.strip_prefix("name=")?;
+    let name = percent_decode_str(name).decode_utf8().ok()?;
+    let is_fit = name.chars().all(|one| one.is_alphanumeric() || one == '-')
+        && name.chars().any(char::is_alphabetic)
+        && name.chars().count() <= 24;
+    let is_taken = name.starts_with("panel") || ["you", "nobody", "comm"].contains(&&*name);
+    (is_fit && !is_taken).then(|| name.into_owned())
+}
+
+/// `host:port`, the host without the brackets of an IPv6 address. Without a port it is 80.
 fn split_port(host: &str) -> Option<(&str, u16)> {
     if let Some(rest) = host.strip_prefix('[') {
         let (name, port) = rest.split_once(']')?;
@@ -134,7 +149,7 @@ fn split_port(host: &str) -> Option<(&str, u16)> {
     }
 }
 
-/// Compares in a time that does not tell how much is right.
+/// Compares two texts, always in the same time, however much of them is equal.
 fn is_same(given: &str, wanted: &str) -> bool {
     given.len() == wanted.len()
         && given
@@ -197,6 +212,34 @@ mod tests {
             assert!(!access.is_origin(origin, "127.0.0.1:7410"), "{origin}");
         }
         assert!(!access.is_origin("http://evil.example:7410", "evil.example:7410"));
+    }
+
+    #[test]
+    fn a_person_has_a_name_of_letters_and_nobody_elses() {
+        assert_eq!(person("name=Anna").as_deref(), Some("Anna"));
+        assert_eq!(person("name=%C3%85sa-2").as_deref(), Some("Åsa-2"));
+        for none in [
+            "",
+            "Anna",
+            "name=",
+            "name=panel-3",
+            "name=-",
+            "name=a%20b",
+            "name=a%0Ab",
+        ] {
+            assert_eq!(person(none), None, "{none}");
+        }
+        for broken in [
+            "name=%",
+            "name=%4",
+            "name=%zz",
+            "name=%C3",
+            "name=a=b",
+            "name=%E2%80%AE",
+        ] {
+            assert_eq!(person(broken), None, "{broken}");
+        }
+        assert_eq!(person(&format!("name={}", "a".repeat(25))), None);
     }
 
     #[test]

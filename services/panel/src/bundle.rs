@@ -1,5 +1,5 @@
-//! The page's modules as one script, so that a slow network brings it in one answer and has room
-//! for STOP beside it.
+//! Joins the page's modules to one script. Over a slow network one answer then brings all of it,
+//! and leaves room for STOP.
 //!
 //! Each module becomes a function that is called once, in the order in which they import each
 //! other:
@@ -10,13 +10,15 @@
 //!                                               return { doing };
 //! ```
 //!
-//! An `import` stands in one line and names what it wants, and an `export` stands before its
-//! `const`, `function` or `class`; the page's modules say no other, and a test holds them to it.
+//! An `import` stands in one line and names the things that it imports. An `export` stands before
+//! its `const`, `function` or `class`. The page's modules use no other form, and a test checks
+//! that.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// The module `entry`, such as `main`, with all that it imports; `source` finds a module's text.
+/// The module `entry`, such as `main`, with everything that it imports. `source` returns a module's
+/// text.
 pub(crate) fn bundle<'s>(entry: &str, source: impl Fn(&str) -> Option<&'s str>) -> String {
     let mut script = String::new();
     add(entry, &source, &mut BTreeSet::new(), &mut script);
@@ -60,7 +62,7 @@ fn import(line: &str) -> Option<(&str, &str)> {
     Some((wanted, from.strip_suffix(".js\";")?))
 }
 
-/// The name that an `export` gives out.
+/// The name that a line exports.
 fn exported(rest: &str) -> Option<&str> {
     let rest = rest.strip_prefix("async ").unwrap_or(rest);
     let (_, rest) = ["const ", "function ", "class "].iter().find_map(|word| {

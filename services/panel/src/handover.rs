@@ -1,4 +1,4 @@
-//! Who asks the driver of a robot for the wheel.
+//! One person asks the driver of a robot for the wheel, and the driver answers.
 //!
 //! ```text
 //!            asks                     the driver hands over or leaves
@@ -7,7 +7,7 @@
 //!                      └──────────────────────────────────────────────────> refused
 //! ```
 //!
-//! One page asks at a time. Seats are the station's; nothing here drives.
+//! One page asks at a time. The station gives the wheel; nothing here drives.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -17,14 +17,14 @@ use lager_lines::Name;
 /// How long a driver may think.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// What has become of a request.
+/// The state of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Request {
     /// The driver has not said anything.
     Waits,
-    /// He keeps the wheel.
+    /// The driver keeps the wheel.
     Kept,
-    /// He has said nothing for too long.
+    /// The driver has said nothing for too long.
     Unanswered,
 }
 
@@ -37,12 +37,12 @@ struct Asked {
     is_kept: bool,
 }
 
-/// The requests, one for each robot at most.
+/// The requests, at most one for each robot.
 #[derive(Debug, Default)]
 pub(crate) struct Handover(BTreeMap<Name, Asked>);
 
 impl Handover {
-    /// A page asks for the wheel of a robot; `Err` is who has asked before.
+    /// A page asks for the wheel of a robot. `Err` is the name of a page that asked before.
     pub(crate) fn ask(
         &mut self,
         robot: &Name,
@@ -64,7 +64,7 @@ impl Handover {
         Ok(())
     }
 
-    /// Who asks and has no answer yet.
+    /// The page that asks and has no answer yet.
     pub(crate) fn who(&self, robot: &Name) -> Option<&str> {
         let asked = self.0.get(robot).filter(|asked| !asked.is_kept)?;
         Some(&asked.name)
@@ -77,7 +77,7 @@ impl Handover {
         }
     }
 
-    /// What has become of the request of this page.
+    /// The state of this page's request.
     pub(crate) fn look(&self, robot: &Name, page: u32, now: Instant) -> Request {
         match self.0.get(robot).filter(|asked| asked.page == page) {
             Some(asked) if asked.is_kept => Request::Kept,
@@ -86,7 +86,7 @@ impl Handover {
         }
     }
 
-    /// The page asks no more.
+    /// The page does not ask any more.
     pub(crate) fn withdraw(&mut self, robot: &Name, page: u32) {
         if self.0.get(robot).is_some_and(|asked| asked.page == page) {
             self.0.remove(robot);

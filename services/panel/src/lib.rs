@@ -7,36 +7,37 @@
 //! ```
 //!
 //! - [`Panel`]: the server, in one thread with tasks of its own.
-//! - `page`: the files, embedded, and `bundle`: their scripts as one.
+//! - `page`: the files, embedded and packed, and `bundle`: their scripts as one.
 //! - `stop`: STOP by a form, which needs no script and no socket.
-//! - `access`: who may open the files. How many may ask, and for how long, is `lager_door`'s.
+//! - `access`: who may open the files. `lager_door` decides how many may ask, and for how long.
 //! - `speech`: the lines that page and panel say to each other.
-//! - `socket`: one page's conversation, and `visit`: what it may do, has asked and has been told.
-//! - `late`: how late what a page says comes, and `handover`: who asks whom for the wheel.
+//! - `socket`: one page's conversation, and `visit`: what one page may do, has asked and has been
+//!   told.
+//! - `handover`: who asks whom for the wheel. [`lager_orders::Late`] finds out how late a line comes.
 //!
-//! It knows of a robot what the station knows, joins no bus, and has no right that the station has
-//! not. What a page orders counts as long as its socket lives: the driver's seat is left with it.
+//! The panel knows of a robot only what the station knows. It joins no bus, and has no right that
+//! the station does not have. When a page's socket closes, its driver loses the wheel.
 
 #![forbid(unsafe_code)]
 
 mod access;
 mod bundle;
 mod handover;
-mod late;
 mod page;
 mod socket;
 mod speech;
 mod stop;
 mod visit;
 
+use std::collections::BTreeSet;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use axum::Router;
-use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State, WebSocketUpgrade};
+use axum::extract::{ConnectInfo, DefaultBodyLimit, RawQuery, Request, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get, post};
@@ -59,13 +60,13 @@ const LIMITS: Limits = Limits {
 };
 /// The longest message of a page, in bytes: a warehouse with all its goods.
 const LONGEST_MESSAGE: usize = 64 * 1024;
-/// How often the end is looked for.
+/// How often the panel looks whether it should end.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Why there is no panel.
 #[derive(Debug, Error)]
 pub enum PanelError {
-    /// The address cannot be had.
+    /// The panel cannot listen at the address.
     #[error("the panel cannot listen at {address}: {error}; choose another one with --panel")]
     Listen {
         /// Which.
@@ -94,9 +95,17 @@ pub(crate) struct Shared {
     /// Who asks for which robot's wheel.
     pub(crate) handover: Mutex<Handover>,
     access: Access,
-    /// Numbers for the names of pages.
+    /// Numbers for pages.
     pages: AtomicU32,
+    /// What the open pages are called.
+    names: Mutex<BTreeSet<String>>,
     open: AtomicUsize,
+}
+
+impl Shared {
+    fn names(&self) -> MutexGuard<'_, BTreeSet<String>> {
+        self.names.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Panel {
@@ -104,7 +113,7 @@ impl Panel {
     ///
     /// # Errors
     ///
-    /// When the address cannot be had.
+    /// When it cannot listen at the address.
     pub fn open(address: SocketAddr, tokens: Tokens, handle: Handle) -> Result<Self, PanelError> {
         let listener =
             TcpListener::bind(address).map_err(|error| PanelError::Listen { address, error })?;
@@ -115,7 +124,7 @@ impl Panel {
     ///
     /// # Errors
     ///
-    /// When it is none.
+    /// When it is no socket that listens.
     pub fn on(listener: TcpListener, tokens: Tokens, handle: Handle) -> Result<Self, PanelError> {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
@@ -127,6 +136,7 @@ impl Panel {
                 handover: Mutex::default(),
                 access: Access::new(address, tokens),
                 pages: AtomicU32::new(0),
+                names: Mutex::default(),
                 open: AtomicUsize::new(0),
             }),
         })
@@ -238,7 +248,15 @@ async fn file(
             "there is no such file here; the page is at /",
         );
     };
-    guarded(([(header::CONTENT_TYPE, kind)], content).into_response())
+    let takes = text(request.headers(), &header::ACCEPT_ENCODING).unwrap_or_default();
+    let kind = (header::CONTENT_TYPE, kind);
+    guarded(match takes.contains("deflate") {
+        true => {
+            let packed = (header::CONTENT_ENCODING, "deflate");
+            ([kind, packed], page::packed(path, &content)).into_response()
+        }
+        false => ([kind], content).into_response(),
+    })
 }
 
 /// The robot that the page's address names, or the only one there is; empty: none.
@@ -270,7 +288,7 @@ async fn stop(
         return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
     }
     visitor.admit();
-    let became = stop::stop(&shared.handle, stop::names(&body)).await;
+    let became = stop::stop(&shared.handle, &stop::by(&body), stop::names(&body)).await;
     let wants = text(&headers, &header::ACCEPT).unwrap_or_default();
     guarded(match wants.contains("text/html") {
         true => axum::response::Html(stop::page(&became)).into_response(),
@@ -325,6 +343,7 @@ async fn live(
     State(shared): State<Arc<Shared>>,
     ConnectInfo(visitor): ConnectInfo<Visitor>,
     headers: HeaderMap,
+    RawQuery(query): RawQuery,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     visitor.has_asked();
@@ -341,7 +360,7 @@ async fn live(
     let Some(rank) = rank(&shared.access, &headers) else {
         return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
     };
-    let Some(place) = Place::take(&shared) else {
+    let Some(page) = OpenPage::take(&shared, query.as_deref().unwrap_or_default()) else {
         return refuse(
             StatusCode::SERVICE_UNAVAILABLE,
             "as many pages look as may; close one of them",
@@ -352,34 +371,47 @@ async fn live(
         .max_message_size(LONGEST_MESSAGE)
         // Half a frame is kept until the rest of it has come.
         .max_frame_size(LONGEST_MESSAGE)
-        .on_upgrade(move |socket| socket::converse(socket, place, rank))
+        .on_upgrade(move |socket| socket::converse(socket, page, rank))
 }
 
 /// One of the places for pages; it is free again when this is dropped.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct OpenPage {
     pub(crate) shared: Arc<Shared>,
     /// The page's number, which no other has had.
     pub(crate) number: u32,
+    /// What other people see when this page drives or stops; no other open page has this name.
+    pub(crate) name: String,
 }
 
-impl Place {
-    fn take(shared: &Arc<Shared>) -> Option<Self> {
+impl OpenPage {
+    /// One for a page whose person wants to be called `wish`; without a name it is a guest's.
+    fn take(shared: &Arc<Shared>, wish: &str) -> Option<Self> {
         let taken = shared
             .open
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |open| {
                 (open < MOST_PAGES).then_some(open + 1)
             });
         taken.ok()?;
+        let number = shared.pages.fetch_add(1, Ordering::Relaxed) + 1;
+        let mut names = shared.names();
+        let mut name = access::person(wish).unwrap_or_else(|| format!("panel-{number}"));
+        if !names.insert(name.clone()) {
+            name = format!("{name}-{number}");
+            names.insert(name.clone());
+        }
+        drop(names);
         Some(Self {
             shared: Arc::clone(shared),
-            number: shared.pages.fetch_add(1, Ordering::Relaxed) + 1,
+            number,
+            name,
         })
     }
 }
 
-impl Drop for Place {
+impl Drop for OpenPage {
     fn drop(&mut self) {
+        self.shared.names().remove(&self.name);
         self.shared.open.fetch_sub(1, Ordering::Relaxed);
     }
 }

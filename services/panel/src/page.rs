@@ -1,7 +1,13 @@
-//! The page's files, in the program itself: nothing is fetched from elsewhere. Its modules are sent
-//! as one script for each page (`bundle`), and STOP names the robot before that script runs.
+//! The page's files, which are part of the program: a browser fetches nothing from elsewhere. The
+//! panel sends the modules of a page as one script (`bundle`). The button STOP has the robot's name
+//! before that script runs.
 
-use std::sync::LazyLock;
+use std::collections::BTreeMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use lager_floor::SideLength;
+use lager_orders::Sentence;
+use miniz_oxide::deflate::compress_to_vec_zlib;
 
 use crate::bundle::bundle;
 
@@ -19,7 +25,9 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/chosen.js", SCRIPT, include_str!("../page/chosen.js")),
     ("/drive.js", SCRIPT, include_str!("../page/drive.js")),
     ("/early.js", SCRIPT, include_str!("../page/early.js")),
+    ("/face.js", SCRIPT, include_str!("../page/face.js")),
     ("/fields.js", SCRIPT, include_str!("../page/fields.js")),
+    ("/fleet.js", SCRIPT, include_str!("../page/fleet.js")),
     ("/hand.js", SCRIPT, include_str!("../page/hand.js")),
     ("/line.js", SCRIPT, include_str!("../page/line.js")),
     ("/link.js", SCRIPT, include_str!("../page/link.js")),
@@ -29,7 +37,6 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/mcap.js", SCRIPT, include_str!("../page/mcap.js")),
     ("/missions.js", SCRIPT, include_str!("../page/missions.js")),
     ("/pads.js", SCRIPT, include_str!("../page/pads.js")),
-    ("/reasons.js", SCRIPT, include_str!("../page/reasons.js")),
     ("/resume.js", SCRIPT, include_str!("../page/resume.js")),
     ("/screen", HTML, include_str!("../page/screen.html")),
     ("/screen.js", SCRIPT, include_str!("../page/screen.js")),
@@ -47,7 +54,8 @@ const FILES: &[(&str, &str, &str)] = &[
 const HTML: &str = "text/html; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// What goes along with each answer: the page runs its own files and talks to its own socket.
+/// The headers of each answer. With them a browser runs only the page's own files, and lets it talk
+/// only to its own socket.
 pub(crate) const HEADERS: &[(&str, &str)] = &[
     (
         "content-security-policy",
@@ -67,14 +75,41 @@ static BUNDLES: LazyLock<[(&str, String); 2]> = LazyLock::new(|| {
     ["main", "screen"].map(|entry| (entry, bundle(entry, |name| written(&format!("/{name}.js")))))
 });
 
+/// The table of sentences, and the limits of a floor, as a script of its own: what stands in it, the
+/// page never says otherwise.
+static TABLE: LazyLock<String> = LazyLock::new(|| {
+    let sentences = Sentence::all().map(
+        |Sentence {
+             name,
+             english,
+             swedish,
+         }| { (name, serde_json::json!({ "en": english, "sv": swedish })) },
+    );
+    let table: BTreeMap<_, _> = sentences.collect();
+    let limits = serde_json::json!({
+        "squares": lager_floor::MAX_SQUARES,
+        "leastSideCm": SideLength::MIN_CM,
+        "mostSideCm": SideLength::MAX_CM,
+        "goods": lager_floor::MAX_PRODUCTS,
+    });
+    let table = serde_json::json!(table);
+    format!("export const TABLE = {table};\nexport const LIMITS = {limits};\n")
+});
+
 /// A file as it is written.
 fn written(path: &str) -> Option<&'static str> {
+    if path == "/table.js" {
+        return Some(&TABLE);
+    }
     let found = FILES.iter().find(|(name, ..)| *name == path)?;
     Some(found.2)
 }
 
 /// Type and content of a file as it is sent, for a page that shows `robot`; empty: none is chosen.
 pub(crate) fn file(path: &str, robot: &str) -> Option<(&'static str, String)> {
+    if path == "/table.js" {
+        return Some((SCRIPT, TABLE.clone()));
+    }
     let (_, kind, content) = FILES.iter().find(|(name, ..)| *name == path)?;
     let mut bundles = BUNDLES.iter();
     let bundled = bundles.find(|(entry, _)| path.strip_prefix('/') == Some(&format!("{entry}.js")));
@@ -84,6 +119,19 @@ pub(crate) fn file(path: &str, robot: &str) -> Option<(&'static str, String)> {
         None => (*content).to_owned(),
     };
     Some((kind, content))
+}
+
+/// A file as it is sent to who takes it packed: in zlib's form, which HTTP calls `deflate`.
+pub(crate) fn packed(path: &str, content: &str) -> Vec<u8> {
+    static PACKED: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let pack = || compress_to_vec_zlib(content.as_bytes(), 6);
+    // A page has the name of its robot in it.
+    if ["/", "/screen"].contains(&path) {
+        return pack();
+    }
+    let mut packed = PACKED.lock().unwrap_or_else(PoisonError::into_inner);
+    let packed = packed.entry(path.to_owned()).or_insert_with(pack);
+    packed.clone()
 }
 
 #[cfg(test)]
@@ -107,6 +155,19 @@ mod tests {
         assert_eq!(there, known);
         let bytes: usize = FILES.iter().map(|(.., content)| content.len()).sum();
         assert!(bytes < 250_000, "{bytes}");
+    }
+
+    #[test]
+    fn what_a_slow_network_carries_is_small_and_unpacks_to_the_same() {
+        let mut bytes = 0;
+        for path in ["/", "/style.css", "/early.js", "/main.js"] {
+            let (_, content) = file(path, "r1").unwrap();
+            let packed = packed(path, &content);
+            bytes += packed.len();
+            let unpacked = miniz_oxide::inflate::decompress_to_vec_zlib(&packed);
+            assert_eq!(unpacked.unwrap(), content.as_bytes(), "{path}");
+        }
+        assert!(bytes < 80_000, "{bytes}");
     }
 
     #[test]
@@ -180,20 +241,14 @@ mod tests {
 
     #[test]
     fn both_languages_have_the_same_words() {
-        for name in ["/words.js", "/sentences.js"] {
-            same_words(name);
-        }
-    }
-
-    fn same_words(file: &str) {
-        let words = written(file).unwrap();
+        let words = written("/words.js").unwrap();
         let (english, rest) = words.split_once("  sv: {").unwrap();
         let (_, english) = english.split_once("  en: {").unwrap();
         let (swedish, _) = rest.split_once("\n};").unwrap();
         let (english, swedish) = (keys(english), keys(swedish));
         assert!(english.len() > 100, "{english:?}");
         let missing: Vec<_> = english.symmetric_difference(&swedish).collect();
-        assert!(missing.is_empty(), "{file}: {missing:?}");
+        assert!(missing.is_empty(), "{missing:?}");
     }
 
     /// What stands between each `before` and the next quotation mark.
@@ -220,7 +275,9 @@ mod tests {
                 said.extend(quoted(content, before));
             }
         }
-        let unknown: Vec<_> = said.difference(&known).collect();
+        let sentences: BTreeSet<&str> = Sentence::all().map(|sentence| sentence.name).collect();
+        let unknown = said.difference(&known);
+        let unknown: Vec<_> = unknown.filter(|name| !sentences.contains(*name)).collect();
         assert!(unknown.is_empty(), "said and not in the table: {unknown:?}");
         // Others stand in lists and in names that are put together.
         let everything: String = FILES.iter().map(|(.., content)| *content).collect();

@@ -1,7 +1,8 @@
-//! One page's conversation: what it says is carried out at once, what has changed is told it.
+//! The conversation with one page. The panel carries out at once what the page says, and tells the
+//! page what has changed.
 //!
-//! Reading and telling are two futures beside each other: a page that takes nothing in can still
-//! stop a robot, and is dropped when it has taken nothing in for [`SLOW`].
+//! Two futures do this beside each other. So a page that reads nothing can still stop a robot. The
+//! panel closes the socket of a page that has read nothing for [`SLOW`].
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -9,18 +10,19 @@ use std::time::{Duration, Instant};
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
+use lager_orders::Code;
 use tokio::time::{sleep, timeout};
 
-use crate::Place;
+use crate::OpenPage;
 use crate::access::Rank;
 use crate::visit::Visit;
 
-/// How often it is looked what there is to tell when the station tells nothing new.
+/// How often the panel looks for something to tell while the station has nothing new.
 const LOOK: Duration = Duration::from_millis(100);
 /// A robot says several things at a time; what comes within this time is told in one message, since
 /// each costs the browser a turn of its own.
 const GATHER: Duration = Duration::from_millis(3);
-/// How often a page is asked whether it is there.
+/// How often the panel asks a page whether it is there.
 const PING: Duration = Duration::from_secs(1);
 /// How long a page may take to take a message in.
 const SLOW: Duration = Duration::from_secs(2);
@@ -29,11 +31,9 @@ const SILENT: Duration = Duration::from_secs(5);
 /// Messages that a page may send within a second.
 const MOST_MESSAGES: u32 = 200;
 
-const TOO_MUCH: &str = "more is said than a person can";
-
 /// Talks with a page until one of the two ends it.
-pub(crate) async fn converse(socket: WebSocket, place: Place, rank: Rank) {
-    let visit = Mutex::new(Visit::new(place, rank));
+pub(crate) async fn converse(socket: WebSocket, page: OpenPage, rank: Rank) {
+    let visit = Mutex::new(Visit::new(page, rank));
     let (mut sink, stream) = socket.split();
     let why = tokio::select! {
         why = listen(stream, &visit) => why,
@@ -44,21 +44,21 @@ pub(crate) async fn converse(socket: WebSocket, place: Place, rank: Rank) {
     if let Some(why) = why {
         let frame = CloseFrame {
             code: close_code::POLICY,
-            reason: Utf8Bytes::from_static(why),
+            reason: Utf8Bytes::from_static(why.as_str()),
         };
         let _ = timeout(SLOW, sink.send(Message::Close(Some(frame)))).await;
     }
 }
 
 /// Carries out what the page says; why it is closed, if that is to be told.
-async fn listen(mut stream: SplitStream<WebSocket>, visit: &Mutex<Visit>) -> Option<&'static str> {
+async fn listen(mut stream: SplitStream<WebSocket>, visit: &Mutex<Visit>) -> Option<Code> {
     let mut since = Instant::now();
     let mut messages = 0;
     loop {
         let message = match timeout(SILENT, stream.next()).await {
             Ok(Some(Ok(message))) => message,
             Ok(_) => return None,
-            Err(_) => return Some("the page does not answer"),
+            Err(_) => return Some(Code::PageSilent),
         };
         if since.elapsed() >= Duration::from_secs(1) {
             since = Instant::now();
@@ -71,25 +71,22 @@ async fn listen(mut stream: SplitStream<WebSocket>, visit: &Mutex<Visit>) -> Opt
             // A stop counts, however much was said before it.
             let is_much = messages > MOST_MESSAGES;
             if is_much && !line.as_str().starts_with("stop ") {
-                return Some(TOO_MUCH);
+                return Some(Code::TooMuch);
             }
             if !visit.heard(line.as_str()) {
-                return Some("this page speaks another language; load it anew");
+                return Some(Code::OtherLanguage);
             }
             if is_much {
-                return Some(TOO_MUCH);
+                return Some(Code::TooMuch);
             }
         } else if matches!(message, Message::Binary(_)) {
-            return Some("a page says lines of text");
+            return Some(Code::NotLines);
         }
     }
 }
 
 /// Tells the page what has changed.
-async fn tell(
-    sink: &mut SplitSink<WebSocket, Message>,
-    visit: &Mutex<Visit>,
-) -> Option<&'static str> {
+async fn tell(sink: &mut SplitSink<WebSocket, Message>, visit: &Mutex<Visit>) -> Option<Code> {
     let mut changes = lock(visit).changes();
     let mut pinged = Instant::now();
     loop {

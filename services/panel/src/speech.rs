@@ -5,38 +5,45 @@
 //! # Page to panel, one line in a message
 //!
 //! ```text
-//! do <robot> <number> <ms> <action> as in the extension; answered by `answer <number> ...`, once
-//! stop <robot> <number>             stand at once; carried out before all that waits
-//! take <robot> <number>             the driver's seat; of whoever has it, it is asked for
-//! free <robot> <number>             leave it, for whoever asks first of all
-//! keep <robot> <number>             the driver does not leave it for whoever asks
-//! warehouse <number> <json>         another warehouse; the fields of the station's file
-//! here <ms>                         once a second
+//! do <robot> <number> <ms> <action> as in the extension, but `drive` without a time, which is the
+//!                                   station's; answered by `answer <number> ...`, once
+//! stop <robot> <number>             stand at once; the panel does this before all that waits
+//! take <robot> <number>             take the wheel, or ask the person who drives for it
+//! free <robot> <number>             leave the wheel; the person who has asked gets it
+//! keep <robot> <number>             refuse to hand over the wheel
+//! warehouse <number> <json>         describe another warehouse, in the fields of the station's file
+//! here <ms>                         the page is there; once a second
 //! ```
 //!
-//! `<ms>` is when it was said, by the page's own clock: an action that was held up is refused.
+//! `<ms>` is the time of the page's own clock. The panel refuses an action that arrives too late.
 //!
 //! # Panel to page, one or more lines in a message
 //!
 //! ```text
-//! you <name> driver|viewer          what this page is called and may do; the first line
+//! you <name> driver|viewer          what this page is called and may do; the first line. A person
+//!                                   asks for a name by the socket's address (`/live?name=Anna`)
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
 //! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>
 //!                                   <what>`: a person here wants an action, `stop`, `take` or `free`
-//! past <robot> <ms> <report>        an event, a thought or what was asked, so long ago
-//! answer <number> done [<text>] | stopped <ms> | refused <text> | lost <text>
+//! past <robot> <ms> <report>        the same, from that many ms ago
+//! answer <number> done [<reason>{; <reason>}] | stopped <ms> | refused <reason> | lost <reason>
 //! ```
 //!
-//! `done` says of a warehouse where it is kept, and what robots do with it that know another one.
-//! `lost`: it was given to the robot, and nobody knows what came of it.
+//! The page makes a sentence of a reason in its reader's language ([`lager_orders::Reason`]). After
+//! `warehouse`, `done` says where the station keeps it, and what robots do that know another
+//! warehouse. `lost` means that the robot got the action, and that nobody knows what it did.
 //!
-//! A line that cannot be read is refused if it has a number; a page that goes on like this is
-//! closed.
+//! The panel refuses a line that it cannot read, if the line has a number. It closes a page that
+//! goes on like this.
 
-use lager_lines::extension::{Action, Order};
+use std::fmt::Display;
+
+use lager_lines::extension::Order;
 use lager_lines::{Name, hint};
-use lager_station::Warehouse;
+use lager_orders::lease::COMMAND;
+use lager_orders::{Action, Code, Reason};
+use lager_plant::Warehouse;
 
 /// What a page says.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,18 +76,18 @@ pub(crate) enum Said {
     },
 }
 
-/// Why a line is none.
+/// Why the panel cannot read a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Unread {
     /// The line's number, if it could be read.
     pub(crate) number: Option<u32>,
     /// What is wrong with it.
-    pub(crate) why: String,
+    pub(crate) why: Reason,
 }
 
 impl Unread {
-    fn new(number: Option<u32>, why: impl Into<String>) -> Self {
-        let why = why.into();
+    fn new(number: Option<u32>, why: impl Display) -> Self {
+        let why = Reason::new(Code::Misread, &[&why]);
         Self { number, why }
     }
 }
@@ -110,7 +117,11 @@ fn read_warehouse(rest: &str) -> Result<Said, Unread> {
     let number = read_number(number)?;
     let warehouse = serde_json::from_str(json).map_err(|error: serde_json::Error| {
         let hint = hint(&error.to_string());
-        Unread::new(Some(number), format!("this is no warehouse: {error}{hint}"))
+        let why = Reason::new(Code::NoWarehouse, &[&format!("{error}{hint}")]);
+        Unread {
+            number: Some(number),
+            why,
+        }
     })?;
     Ok(Said::Warehouse {
         number,
@@ -122,7 +133,7 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
     let (robot, rest) = rest.split_once(' ').unwrap_or((rest, ""));
     let (number, action) = rest.split_once(' ').unwrap_or((rest, ""));
     let number = read_number(number)?;
-    let robot = Name::new(robot).map_err(|error| Unread::new(Some(number), error.to_string()))?;
+    let robot = Name::new(robot).map_err(|error| Unread::new(Some(number), error))?;
     if word == "do" {
         let (said_ms, action) = action.split_once(' ').unwrap_or((action, ""));
         let said_ms = said_ms.parse().map_err(|_| {
@@ -131,7 +142,11 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
                 "the page's time in ms belongs before the action",
             )
         })?;
-        return match Order::read(&format!("do {number} {action}")) {
+        let lease = match action.starts_with("drive ") {
+            true => format!(" {}", COMMAND.as_millis()),
+            false => String::new(),
+        };
+        return match Order::read(&format!("do {number} {action}{lease}")) {
             // How late it is, nobody says but the panel.
             Some(Ok(Order::Do {
                 number,
@@ -143,7 +158,7 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
                 said_ms,
                 action,
             }),
-            Some(Err(error)) => Err(Unread::new(Some(number), error.to_string())),
+            Some(Err(error)) => Err(Unread::new(Some(number), error)),
             _ => Err(Unread::new(Some(number), "this is no action")),
         };
     }
@@ -167,6 +182,8 @@ fn read_number(text: &str) -> Result<u32, Unread> {
 
 #[cfg(test)]
 mod tests {
+    use lager_lines::extension::Spelled;
+
     use super::*;
 
     #[test]
@@ -176,29 +193,29 @@ mod tests {
             number: 5,
             said_ms: 70_000,
             action,
-        }) = read("do r1 5 70000 drive 2 200")
+        }) = read("do r1 5 70000 drive 2")
         else {
             panic!();
         };
         assert_eq!(robot, Name::new("r1").unwrap());
-        assert_eq!(action.to_string(), "drive 00000010 200");
+        assert_eq!(Spelled(&action).to_string(), "drive 00000010 150");
     }
 
     #[test]
     fn what_is_none_says_why_and_whose() {
         let why = |line| read(line).unwrap_err();
         assert_eq!(why("do r1 5 0 fly").number, Some(5));
-        assert!(why("do r1 5 0 fly").why.contains("one of order"));
-        assert!(why("do r1 5 resume 7").why.contains("time in ms"));
+        assert!(why("do r1 5 0 fly").why.as_str().contains("one of order"));
+        assert!(why("do r1 5 resume 7").why.as_str().contains("time in ms"));
         assert_eq!(why("do r1 x 0 resume 7").number, None);
         assert_eq!(why("do R! 5 0 resume 7").number, Some(5));
         assert_eq!(why("here").number, None);
         assert_eq!(why("take r1 5 6").number, Some(5));
-        assert!(why("hello").why.contains("warehouse"));
+        assert!(why("hello").why.as_str().contains("warehouse"));
         assert_eq!(why("").number, None);
         let wrong = why("warehouse 7 {\"size\":[2,2]}");
         assert_eq!(wrong.number, Some(7));
-        assert!(wrong.why.contains("side_length_cm"), "{wrong:?}");
+        assert!(wrong.why.as_str().contains("side_length_cm"), "{wrong:?}");
     }
 
     #[test]
@@ -215,12 +232,15 @@ mod tests {
         let Ok(Said::Warehouse { warehouse, .. }) = read(line) else {
             panic!();
         };
-        assert_eq!(warehouse.size, [2, 3]);
+        assert_eq!((warehouse.size.x, warehouse.size.y), (2, 3));
         assert_eq!(warehouse.products.len(), 1);
-        assert_eq!(warehouse.exit.map(|exit| exit.length_cm), Some(80));
+        assert_eq!(warehouse.exit.length_cm, 80);
         let Err(unread) = read(&line.replace("side\":", "sied\":")) else {
             panic!("a mistyped key is taken");
         };
-        assert!(unread.why.ends_with("; did you mean `side`?"), "{unread:?}");
+        assert!(
+            unread.why.as_str().ends_with("; did you mean `side`?"),
+            "{unread:?}"
+        );
     }
 }

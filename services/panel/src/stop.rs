@@ -1,29 +1,33 @@
-//! STOP without a script: a form of the page posts here, whatever else of the page has loaded.
+//! STOP without a script. A form of the page posts here, even if nothing else of the page has
+//! loaded yet.
 //!
 //! ```text
-//!   POST /stop   robot=r1[&robot=r2 ...]   those; an empty name, or none: every robot that is known
+//!   POST /stop   [name=Anna&]robot=r1[&robot=r2 ...]   Anna stops these robots; if none is named, all
 //! ```
 //!
-//! It is answered with what became of it, once each robot has confirmed it or [`CONFIRM`] is over:
-//! as a page with the form again, or, to the page's script, as lines (`<robot> <word> [<ms>]`).
-//! Whoever may look may stop.
+//! The panel answers when each robot has confirmed the stop, or when [`CONFIRM`] is over. A browser
+//! gets a page that says what each robot did, with the form again. The page's script gets lines
+//! (`<robot> <word> [<ms>]`). Everybody who may look may stop.
 
-use std::fmt::Write as _;
+use std::fmt::Write;
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
+use lager_orders::{Language, Sentence};
 use lager_station::{Awaited, Doing, Handle, Reply};
+
+use crate::access::person;
 
 /// How long a robot has to confirm a stop.
 const CONFIRM: Duration = Duration::from_secs(1);
-/// How often it is looked whether it has.
+/// How often the panel looks whether it has.
 const LOOK: Duration = Duration::from_millis(5);
-/// Who stops by the form, which has no name of its own.
+/// Who stops by the form if the person has chosen no name.
 const FORM: &str = "panel";
 /// The longest body, in bytes: the names of as many robots as a station knows.
 pub(crate) const LONGEST_BODY: usize = 4 * 1024;
 
-/// What became of a stop.
+/// The outcome of a stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Became {
     /// The steering board reports both motors off, so many ms after the robot has read it.
@@ -49,32 +53,20 @@ impl Became {
             Self::Unknown => "unknown".into(),
         }
     }
+}
 
-    /// As a sentence in English and in Swedish.
-    fn sentences(&self, robot: &str) -> [String; 2] {
-        match self {
-            Self::Stands(ms) => [
-                format!("{robot} stands after {ms} ms"),
-                format!("{robot} står efter {ms} ms"),
-            ],
-            Self::Sent => [
-                format!("sent to {robot}, which confirms nothing"),
-                format!("skickat till {robot}, som inte bekräftar något"),
-            ],
-            Self::Unconfirmed => [
-                format!("sent to {robot}, not confirmed: it may still be moving"),
-                format!("skickat till {robot}, ej bekräftat: den kan röra sig"),
-            ],
-            Self::Unheard => [
-                format!("NOT SENT: {robot} is not heard"),
-                format!("EJ SKICKAT: {robot} hörs inte"),
-            ],
-            Self::Unknown => [
-                format!("NOT SENT: {robot} is not here"),
-                format!("EJ SKICKAT: {robot} finns inte här"),
-            ],
-        }
-    }
+/// What became of a robot's stop, in English and in Swedish; the page's script has the same words.
+fn sentences(robot: &str, word: &str) -> [String; 2] {
+    let (word, ms) = word.split_once(' ').unwrap_or((word, ""));
+    let sentence = Sentence::of(&format!("became_{word}"));
+    [Language::English, Language::Swedish].map(|language| {
+        let mut said = String::new();
+        let mut value =
+            |key: &str, to: &mut dyn Write| to.write_str(if key == "ms" { ms } else { robot });
+        let put = sentence.map(|sentence| sentence.put(language, &mut said, &mut value));
+        debug_assert_eq!(put, Some(Ok(())), "the table has no {word}");
+        said
+    })
 }
 
 /// The names in a form's body, in their order. Names need no escapes, so what has one is none of a
@@ -87,8 +79,15 @@ pub(crate) fn names(body: &str) -> Vec<String> {
     names.map(str::to_owned).collect()
 }
 
-/// Stops these robots, or all if none is named, and waits for what becomes of it.
-pub(crate) async fn stop(handle: &Handle, names: Vec<String>) -> Vec<(String, Became)> {
+/// Who presses: the name that the person has chosen.
+pub(crate) fn by(body: &str) -> String {
+    let mut fields = body.split('&');
+    fields.find_map(person).unwrap_or_else(|| FORM.to_owned())
+}
+
+/// Stops these robots, or all if none is named, in this person's name, and waits for what becomes of
+/// it.
+pub(crate) async fn stop(handle: &Handle, by: &str, names: Vec<String>) -> Vec<(String, Became)> {
     let names = match names.is_empty() {
         true => handle
             .robots()
@@ -98,7 +97,7 @@ pub(crate) async fn stop(handle: &Handle, names: Vec<String>) -> Vec<(String, Be
         false => names,
     };
     // All are told before any is waited for.
-    let told: Vec<_> = names.iter().map(|name| tell(handle, name)).collect();
+    let told: Vec<_> = names.iter().map(|name| tell(handle, by, name)).collect();
     let began = Instant::now();
     let mut became = Vec::new();
     for (name, told) in names.into_iter().zip(told) {
@@ -112,7 +111,7 @@ pub(crate) async fn stop(handle: &Handle, names: Vec<String>) -> Vec<(String, Be
     became
 }
 
-fn tell(handle: &Handle, name: &str) -> Result<Option<Awaited>, Became> {
+fn tell(handle: &Handle, by: &str, name: &str) -> Result<Option<Awaited>, Became> {
     let name = Name::new(name).map_err(|_| Became::Unknown)?;
     let doing = handle.look(|station| station.robot(&name).map(lager_station::Robot::doing));
     match doing {
@@ -121,7 +120,7 @@ fn tell(handle: &Handle, name: &str) -> Result<Option<Awaited>, Became> {
         Some(Doing::Away) => Err(Became::Unheard),
         Some(_) => {
             let told = handle.stop(&name).map_err(|_| Became::Unheard);
-            handle.note(&name, FORM, "stop");
+            handle.note(&name, by, "stop");
             told
         }
     }
@@ -153,14 +152,10 @@ pub(crate) fn lines(became: &[(String, Became)]) -> String {
 /// The answer as a page.
 pub(crate) fn page(became: &[(String, Became)]) -> String {
     let mut said = String::new();
-    let nobody = [
-        "NOT SENT: no robot has connected".to_owned(),
-        "EJ SKICKAT: ingen robot har anslutit".to_owned(),
-    ];
-    let sentences = became
-        .iter()
-        .map(|(name, what)| what.sentences(&safe(name)));
-    for [english, swedish] in sentences.chain(became.is_empty().then_some(nobody)) {
+    let nobody = became.is_empty().then(|| sentences("", "none"));
+    let all = became.iter();
+    let all = all.map(|(name, what)| sentences(&safe(name), &what.word()));
+    for [english, swedish] in all.chain(nobody) {
         let _ = writeln!(
             said,
             "<p>{english}<br><span lang=\"sv\">{swedish}</span></p>"
@@ -212,7 +207,10 @@ mod tests {
         ];
         assert_eq!(lines(&became), "r1 stands 10\n<b> unknown\n");
         let said = page(&became);
-        assert!(said.contains("<p>r1 stands after 10 ms<br>"), "{said}");
+        assert!(
+            said.contains("<p>r1: both wheels stand after 10 ms<br>"),
+            "{said}"
+        );
         assert!(said.contains("NOT SENT: b is not here"), "{said}");
         assert!(!said.contains("<b>"), "{said}");
         assert!(page(&[]).contains("NOT SENT: no robot has connected"));

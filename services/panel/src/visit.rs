@@ -1,4 +1,4 @@
-//! What one page may do, has asked and has been told. It waits for nobody.
+//! One page: what it may do, what it has asked, and what the panel has told it. Nothing here waits.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,51 +6,44 @@ use std::sync::{MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
-use lager_lines::extension::{Action, Mode, Report};
-use lager_station::{
-    Awaited, Doing, Driver, Given, Reply, Saving, Subscription, Told, View, Warehouse,
-};
+use lager_lines::extension::{Report, Spelled};
+use lager_orders::{Action, Code, Late, Mode, Reason};
+use lager_plant::Warehouse;
+use lager_station::{Awaited, Doing, Driver, Given, Reply, Saving, Saying, Subscription, View};
 use tokio::sync::watch;
 
-use crate::Place;
+use crate::OpenPage;
 use crate::access::Rank;
 use crate::handover::{Handover, Request};
-use crate::late::Late;
 use crate::speech::{Said, Unread, read};
 
-/// How often a driver who drives nowhere is still there.
+/// How often a page tells the station that its driver is still there while nothing moves.
 const STAY: Duration = Duration::from_secs(1);
-/// How often a page is told of a robot that says nothing.
+/// How often the panel tells a page about a robot that says nothing.
 const ABOUT: Duration = Duration::from_millis(100);
-/// What is older than this when a page is told it is told with its age.
+/// The panel tells a page the age of everything that is older than this.
 const JUST_NOW: Duration = Duration::from_secs(1);
 /// Lines without a number that a page may say.
 const MOST_UNREAD: u32 = 20;
 
-const ONLY_LOOKS: &str = "this page may look and stop; a driver's address is needed for more";
-const NOT_DRIVER: &str = "take the wheel first";
-const UNANSWERED: &str = "the robot does not answer";
-
 /// A page that is open.
 #[derive(Debug)]
 pub(crate) struct Visit {
-    place: Place,
-    /// What others are told who drives.
-    name: String,
+    page: OpenPage,
     rank: Rank,
     /// The robots that this page drives.
     wheels: BTreeMap<Name, Driver>,
     /// The robots whose drivers it has asked for the wheel, with the page's number.
     asks: BTreeMap<Name, u32>,
     late: Late,
-    /// What robots have not answered yet, with the page's number.
+    /// The actions that robots have not answered yet, with the page's numbers.
     asked: Vec<(u32, Awaited)>,
-    /// Warehouses that are being saved, likewise.
+    /// Warehouses that are being saved, with the page's numbers.
     saving: Vec<(u32, Saving)>,
     subscription: Subscription,
     /// When it began, by the station's clock.
     began: Duration,
-    /// Lines to be said.
+    /// Lines for the page.
     lines: String,
     robots: BTreeMap<Name, LastTold>,
     warehouse: Option<Option<Warehouse>>,
@@ -61,22 +54,20 @@ pub(crate) struct Visit {
     unread: u32,
 }
 
-/// When what a page was told of a robot last was new.
+/// When the last news of a robot that the page was told was new.
 #[derive(Debug, Default)]
 struct LastTold {
     at: [Option<Duration>; 9],
 }
 
 impl Visit {
-    pub(crate) fn new(place: Place, rank: Rank) -> Self {
-        let name = format!("panel-{}", place.number);
+    pub(crate) fn new(page: OpenPage, rank: Rank) -> Self {
         let now = Instant::now();
         Self {
-            lines: format!("you {name} {}\n", rank.as_str()),
-            subscription: place.shared.handle.recall(),
-            began: place.shared.handle.now(),
-            place,
-            name,
+            lines: format!("you {} {}\n", page.name, rank.as_str()),
+            subscription: page.shared.handle.recall(),
+            began: page.shared.handle.now(),
+            page,
             rank,
             wheels: BTreeMap::new(),
             asks: BTreeMap::new(),
@@ -93,24 +84,24 @@ impl Visit {
         }
     }
 
-    /// The page has said something, if only that it is there.
+    /// The page has said something, at least that it is there.
     pub(crate) fn is_there(&mut self) {
         self.there = true;
     }
 
     /// Changes whenever the station knows something new.
     pub(crate) fn changes(&self) -> watch::Receiver<u64> {
-        self.place.shared.changes.subscribe()
+        self.page.shared.changes.subscribe()
     }
 
-    /// Carries out a line; whether the page may go on.
+    /// Carries out a line. Returns whether the page may go on.
     pub(crate) fn heard(&mut self, line: &str) -> bool {
         match read(line) {
             Ok(said) => self.carry_out(said),
             Err(Unread { number, why }) => {
                 self.unread += u32::from(number.is_none());
                 if let Some(number) = number {
-                    self.refuse(number, &why);
+                    self.refuse(number, why);
                 }
             }
         }
@@ -118,15 +109,15 @@ impl Visit {
     }
 
     fn carry_out(&mut self, said: Said) {
-        let handle = self.place.shared.handle.clone();
+        let handle = self.page.shared.handle.clone();
         if let Said::Stop { robot, number } = said {
             match handle.stop(&robot) {
                 Ok(Some(awaited)) => self.asked.push((number, awaited)),
-                // It speaks the document's language, which confirms nothing.
+                // The robot speaks the document's language, which confirms nothing.
                 Ok(None) => self.answer(number, "done"),
-                Err(why) => return self.refuse(number, &why.to_string()),
+                Err(why) => return self.refuse(number, &why),
             }
-            return handle.note(&robot, &self.name, "stop");
+            return handle.note(&robot, &self.page.name, "stop");
         }
         if let Said::Here { said_ms } = said {
             self.late.hear(said_ms, handle.now());
@@ -142,7 +133,7 @@ impl Visit {
             return;
         };
         if self.rank != Rank::Driver {
-            return self.refuse(number, ONLY_LOOKS);
+            return self.refuse(number, Code::OnlyLooks);
         }
         match said {
             Said::Do {
@@ -165,70 +156,74 @@ impl Visit {
                 self.handover().keep(&robot);
                 self.answer(number, "done");
             }
-            Said::Keep { .. } => self.refuse(number, NOT_DRIVER),
+            Said::Keep { .. } => self.refuse(number, Code::NotDriver),
             Said::Warehouse { warehouse, .. } => match handle.set_warehouse(*warehouse) {
                 Ok(saving) => self.saving.push((number, saving)),
-                Err(why) => self.refuse(number, &why.to_string()),
+                Err(why) => self.refuse(number, why),
             },
             Said::Stop { .. } | Said::Here { .. } => {}
         }
     }
 
-    /// Takes a free wheel, or asks for one that another page has.
+    /// Takes a free wheel, or asks another page for it.
     fn take(&mut self, robot: Name, number: u32) {
         if self.wheels.contains_key(&robot) {
             return self.answer(number, "done");
         }
-        let (page, now) = (self.place.number, Instant::now());
+        let (page, now) = (self.page.number, Instant::now());
         let another = self.handover().who(&robot).map(str::to_owned);
-        let another = another.filter(|another| *another != self.name);
+        let another = another.filter(|another| *another != self.page.name);
         if another.is_none() && self.driver_of(&robot).is_none() {
             return self.seat(robot, number);
         }
-        let asked = self.handover().ask(&robot, page, &self.name, now);
+        let asked = self.handover().ask(&robot, page, &self.page.name, now);
         match asked {
             Ok(()) => {
                 if let Some(before) = self.asks.insert(robot, number) {
-                    self.refuse(before, "it is asked for anew");
+                    self.refuse(before, Code::AskedAnew);
                 }
             }
-            Err(who) => self.refuse(number, &format!("{who} has asked for the wheel before")),
+            Err(who) => self.refuse(number, Reason::new(Code::WheelAsked, &[&who])),
         }
     }
 
     fn seat(&mut self, robot: Name, number: u32) {
-        match self.place.shared.handle.take_wheel(&robot, &self.name) {
+        match self.page.shared.handle.take_wheel(&robot, &self.page.name) {
             Ok(driver) => {
                 self.note(&robot, "take");
                 self.wheels.insert(robot, driver);
                 self.answer(number, "done");
             }
-            Err(why) => self.refuse(number, &why.to_string()),
+            Err(why) => self.refuse(number, &why),
         }
     }
 
-    /// Sits down where a driver has left for this page, or says what he has said instead.
+    /// Takes the wheel if its driver has left for this page, or reports the driver's refusal.
     fn take_asked(&mut self) {
         for (robot, number) in std::mem::take(&mut self.asks) {
             let driver = self.driver_of(&robot);
             let request = self
                 .handover()
-                .look(&robot, self.place.number, Instant::now());
+                .look(&robot, self.page.number, Instant::now());
             if request == Request::Waits && driver.is_some() {
                 self.asks.insert(robot, number);
                 continue;
             }
-            self.handover().withdraw(&robot, self.place.number);
+            self.handover().withdraw(&robot, self.page.number);
             match (driver, request) {
                 (None, _) => self.seat(robot, number),
-                (Some(by), Request::Kept) => self.refuse(number, &format!("{by} keeps the wheel")),
-                (Some(by), _) => self.refuse(number, &format!("{by} does not answer; ask again")),
+                (Some(by), Request::Kept) => {
+                    self.refuse(number, Reason::new(Code::WheelKept, &[&by]));
+                }
+                (Some(by), _) => {
+                    self.refuse(number, Reason::new(Code::WheelUnanswered, &[&by]));
+                }
             }
         }
     }
 
     fn handover(&self) -> MutexGuard<'_, Handover> {
-        let handover = self.place.shared.handover.lock();
+        let handover = self.page.shared.handover.lock();
         handover.unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -237,7 +232,7 @@ impl Visit {
         let late = action.late;
         let asked = match (action.what, driver) {
             (Action::Drive { .. } | Action::Arm(_), None) => {
-                return self.refuse(number, NOT_DRIVER);
+                return self.refuse(number, Code::NotDriver);
             }
             // Its lease is the station's.
             (Action::Drive { wheels, .. }, Some(driver)) => {
@@ -246,28 +241,28 @@ impl Visit {
             (Action::Arm(step), Some(driver)) => driver.arm(Given { what: step, late }),
             (action, None) if is_the_drivers(action) && self.driver_of(robot).is_some() => {
                 let by = self.driver_of(robot).unwrap_or_default();
-                return self.refuse(number, &format!("{by} drives the robot; ask him"));
+                return self.refuse(number, Reason::new(Code::AskDriver, &[&by]));
             }
             // Whoever takes it by hand is there to drive it.
-            (Action::Mode(Mode::Manual), None) => return self.refuse(number, NOT_DRIVER),
-            (_, _) => self.place.shared.handle.act(robot, action),
+            (Action::Mode(Mode::Manual), None) => return self.refuse(number, Code::NotDriver),
+            (_, _) => self.page.shared.handle.act(robot, action),
         };
         match asked {
             Ok(awaited) => self.asked.push((number, awaited)),
-            Err(why) => return self.refuse(number, &why.to_string()),
+            Err(why) => return self.refuse(number, &why),
         }
         // What is held, and steps, would be all that there is to read.
         if !matches!(action.what, Action::Drive { .. } | Action::Arm(_)) {
-            self.note(robot, &action.what.to_string());
+            self.note(robot, &Spelled(&action.what).to_string());
         }
     }
 
     fn note(&self, robot: &Name, what: &str) {
-        self.place.shared.handle.note(robot, &self.name, what);
+        self.page.shared.handle.note(robot, &self.page.name, what);
     }
 
     fn driver_of(&self, robot: &Name) -> Option<String> {
-        self.place
+        self.page
             .shared
             .handle
             .look(|station| station.robot(robot)?.driver().map(str::to_owned))
@@ -277,17 +272,17 @@ impl Visit {
         let _ = writeln!(self.lines, "answer {number} {what}");
     }
 
-    fn refuse(&mut self, number: u32, why: &str) {
-        self.answer(number, &format!("refused {}", why.replace('\n', " ")));
+    fn refuse(&mut self, number: u32, why: impl Into<Reason>) {
+        self.answer(number, &format!("refused {}", why.into().as_str()));
     }
 
-    /// What the page has not been told yet.
+    /// The news that the page has not been told yet.
     pub(crate) fn news(&mut self) -> String {
         self.take_answers();
         self.take_asked();
         self.keep_wheels();
         self.tell_events();
-        let handle = self.place.shared.handle.clone();
+        let handle = self.page.shared.handle.clone();
         let revision = handle.revision();
         if self.revision != Some(revision) || self.about.elapsed() >= ABOUT {
             self.revision = Some(revision);
@@ -309,27 +304,32 @@ impl Visit {
                 Some(Reply::Stopped { after_ms }) => {
                     self.answer(number, &format!("stopped {after_ms}"));
                 }
-                Some(Reply::Refused(why)) => self.refuse(number, why.as_str()),
-                Some(Reply::Lost) => self.answer(number, &format!("lost {UNANSWERED}")),
+                Some(Reply::Refused(why)) => self.refuse(number, why),
+                Some(Reply::Lost) => {
+                    self.answer(number, &format!("lost {}", Code::RobotSilent.as_str()));
+                }
             }
         }
         for (number, saving) in std::mem::take(&mut self.saving) {
             match saving.wait(Duration::ZERO) {
                 None => self.saving.push((number, saving)),
-                Some(Ok(())) => self.answer(number, &format!("done {}", saving.sentence())),
-                Some(Err(why)) => self.refuse(number, &why),
+                Some(Ok(())) => {
+                    let told: Vec<_> = saving.told().map(|told| told.as_str().to_owned()).collect();
+                    self.answer(number, &format!("done {}", told.join("; ")));
+                }
+                Some(Err(why)) => self.refuse(number, why),
             }
         }
     }
 
-    /// Stays at the wheels as long as the page is there.
+    /// Keeps the wheels as long as the page is there.
     fn keep_wheels(&mut self) {
         if self.stayed.elapsed() < STAY {
             return;
         }
         self.stayed = Instant::now();
         if std::mem::take(&mut self.there) {
-            // Whoever has lost the wheel reads it in the next line about the robot.
+            // A page that has lost the wheel reads it in the next line about the robot.
             self.wheels.retain(|_, driver| driver.stay().is_ok());
         }
     }
@@ -338,13 +338,14 @@ impl Visit {
         while let Some(news) = self.subscription.next(Duration::ZERO) {
             let robot = news.robot;
             let line = match news.told {
-                Told::Event(event) => Report::Event(event).to_string(),
-                Told::Thinks(thinks) => Report::Thinks(thinks).to_string(),
-                Told::Thought(text) => format!("thought {text}"),
-                Told::Asked { by, what } => format!("asked {by} {what}"),
-                Told::Replied { .. } | Told::Past { .. } => continue,
+                Saying::Event(event) => Report::Event(event).to_string(),
+                Saying::Thinks(thinks) => Report::Thinks(thinks).to_string(),
+                Saying::Because(reason) => Report::Because(reason).to_string(),
+                Saying::Thought(text) => format!("thought {text}"),
+                Saying::Asked { by, what } => format!("asked {by} {what}"),
+                Saying::Replied { .. } | Saying::Past { .. } => continue,
             };
-            let age = self.place.shared.handle.now().saturating_sub(news.at);
+            let age = self.page.shared.handle.now().saturating_sub(news.at);
             let _ = match news.at < self.began || age > JUST_NOW {
                 true => writeln!(self.lines, "past {robot} {} {line}", age.as_millis()),
                 false => writeln!(self.lines, "from {robot} {line}"),
@@ -354,7 +355,7 @@ impl Visit {
 
     fn tell_warehouse(&mut self) {
         let told = self.warehouse.as_ref();
-        let changed = self.place.shared.handle.look(|station| {
+        let changed = self.page.shared.handle.look(|station| {
             let now = station.warehouse();
             (told.map(Option::as_ref) != Some(now)).then(|| now.cloned())
         });
@@ -425,13 +426,14 @@ impl Visit {
 impl Drop for Visit {
     fn drop(&mut self) {
         for robot in std::mem::take(&mut self.asks).into_keys() {
-            self.handover().withdraw(&robot, self.place.number);
+            self.handover().withdraw(&robot, self.page.number);
         }
     }
 }
 
-/// Whether this is left to the driver as long as there is one: it moves the robot, lets it move, or
-/// changes how it drives. Orders wait in a queue, and things in a simulated world are anybody's.
+/// Whether only the driver may do this while there is one, because it moves the robot, lets it
+/// move, or changes how it drives. Everybody may change the queue of orders, and things in a
+/// simulated world.
 fn is_the_drivers(action: Action) -> bool {
     matches!(
         action,

@@ -1,4 +1,4 @@
-//! Files that are read: the I/O around the readers of `lager-journal`.
+//! Reads recordings: the I/O around the readers of `lager-journal`.
 
 use std::fs::File;
 use std::io;
@@ -40,7 +40,7 @@ pub enum BagError {
         /// Why.
         error: ReadError,
     },
-    /// It is whole, and no recording of ours.
+    /// It is undamaged, but another program recorded it.
     #[error(
         "{} was not recorded by lager; other MCAP files can be looked at with `info` and `check`",
         path.display()
@@ -49,7 +49,7 @@ pub enum BagError {
         /// The file.
         path: PathBuf,
     },
-    /// Nothing of it is left.
+    /// Nothing of it can be recovered.
     #[error("{}: nothing can be recovered: {why}", path.display())]
     Nothing {
         /// The file.
@@ -57,12 +57,12 @@ pub enum BagError {
         /// What is wrong with it.
         why: String,
     },
-    /// It has no such topic.
+    /// It does not have this topic.
     #[error("{} has no topic {topic}; it has {there}", path.display())]
     NoTopic {
         /// The file.
         path: PathBuf,
-        /// The topic that was asked for.
+        /// The topic.
         topic: String,
         /// The topics that it has.
         there: String,
@@ -76,12 +76,12 @@ pub enum BagError {
 }
 
 impl BagError {
-    /// Whether only the reader of the output has gone, as after `| head`.
+    /// Whether only the output's reader has gone, as after `| head`.
     pub fn is_closed_output(&self) -> bool {
         matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
     }
 
-    /// Whether what was asked for makes no sense, whatever the file's state is.
+    /// Whether the request itself makes no sense, whatever the file contains.
     pub fn is_usage(&self) -> bool {
         matches!(self, Self::NoTopic { .. })
     }
@@ -118,12 +118,12 @@ impl Bag {
         Ok(metadata.map_err(|error| self.io(error))?.len())
     }
 
-    /// Reads all of it.
+    /// Reads the whole file.
     pub(crate) fn walk(&self, known: Learnt, visit: &mut impl Visit) -> Result<Learnt, BagError> {
         self.walk_and(known, visit, |_| Ok(()))
     }
 
-    /// Reads all of it, and does something after each piece.
+    /// Reads the whole file, and calls a function after each piece.
     pub(crate) fn walk_and<V: Visit>(
         &self,
         known: Learnt,
@@ -144,7 +144,7 @@ impl Bag {
         }
     }
 
-    /// What its end says, or all of it, should its end not say enough.
+    /// The file's overview: from its end, or from all of it if the end does not say enough.
     pub(crate) fn overview(&self) -> Result<Overview, BagError> {
         let overview = match self.end()? {
             Err(ReadError::NoIndex) => {
@@ -157,7 +157,7 @@ impl Bag {
         overview.map_err(|error| self.unreadable(error))
     }
 
-    /// What its end says.
+    /// The overview from the file's end.
     fn end(&self) -> Result<Result<Overview, ReadError>, BagError> {
         let mut reader = OverviewReader::new(self.length()?);
         loop {
@@ -190,7 +190,7 @@ impl Bag {
         Ok(last)
     }
 
-    /// The messages that are selected, by their time. `each` says whether to go on.
+    /// The selected messages, by their time. `each` returns whether to go on.
     pub(crate) fn ordered<E: From<BagError>>(
         &self,
         overview: &Overview,
@@ -212,7 +212,7 @@ impl Bag {
         Ok(())
     }
 
-    /// Refuses a topic that it does not have, and a file that is not ours.
+    /// Refuses a topic that the file does not have, and a file of another program.
     pub(crate) fn must_have(&self, overview: &Overview, topics: &[String]) -> Result<(), BagError> {
         if overview.start.is_none() {
             let path = self.path.clone();
@@ -232,9 +232,9 @@ impl Bag {
         Ok(())
     }
 
-    /// Fewer bytes than were asked for mean that the file ends there.
+    /// Fewer bytes than the reader wanted mean that the file ends there.
     fn part(&self, part: Part) -> Result<Vec<u8>, BagError> {
-        // A damaged index may ask for more than there is.
+        // A damaged index may want more bytes than the file has.
         let left = self.length()?.saturating_sub(part.at);
         let mut bytes = vec![0; part.length.min(usize::try_from(left).unwrap_or(usize::MAX))];
         let mut read = 0;

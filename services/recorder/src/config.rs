@@ -1,17 +1,17 @@
-//! What is recorded, and where to.
+//! What the recorder records, and into which file.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// So many names are tried.
+/// How many names the recorder tries.
 const MOST_NAMES: u32 = 1_000;
 
-/// When a file is ended and the next one begun.
+/// When the recorder ends a file and begins the next one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Split {
-    /// When it has so many bytes.
+    /// When the file has so many bytes.
     pub bytes: Option<u64>,
-    /// When it has been written to for so long.
+    /// When the recorder has written to it for so long.
     pub time: Option<Duration>,
 }
 
@@ -25,25 +25,25 @@ impl Split {
     }
 }
 
-/// What is recorded, and where to.
+/// What the recorder records, and into which file.
 #[derive(Clone, Debug)]
 pub struct RecordConfig {
-    /// The file; it must not be there yet. If files are split, each gets a number.
+    /// The file; it must not exist yet. If the recording is split, each file gets a number.
     pub file: PathBuf,
-    /// Take another name if the file is there already: nobody has asked for this one.
+    /// Take another name if the file exists: nobody has chosen this name.
     pub or_another: bool,
-    /// Names of topics; empty for all, those included that are opened later.
+    /// Names of topics. Empty means all, also those that somebody opens later.
     pub topics: Vec<String>,
-    /// When a new file is begun.
+    /// When to begin a new file.
     pub split: Split,
-    /// Samples that may wait for the disk.
+    /// How many samples may wait for the disk.
     pub queue: usize,
-    /// How often what has come is put on the disk.
+    /// How often the recorder writes the samples to the disk.
     pub flush: Duration,
 }
 
 impl RecordConfig {
-    /// Where that file of the recording is.
+    /// The path of that file of the recording.
     pub(crate) fn path(&self, part: u32) -> PathBuf {
         if !self.split.is_wanted() {
             return self.file.clone();
@@ -52,7 +52,7 @@ impl RecordConfig {
         self.file.with_file_name(format!("{stem}-{part:03}.mcap"))
     }
 
-    /// The names that it may have, the first one as it was asked for: `tour.mcap`, `tour-2.mcap`.
+    /// The names to try, the wished one first: `tour.mcap`, `tour-2.mcap`.
     pub(crate) fn names(&self) -> impl Iterator<Item = Self> {
         (1..=MOST_NAMES).map(|number| {
             let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();

@@ -1,12 +1,13 @@
 //! A file that grows at its end, with room reserved beyond it.
 //!
-//! Room is reserved with `fallocate`, which takes blocks of the file system without making the file
-//! longer; so what is written into it later cannot fail for want of room. A file system that cannot
-//! do that is written to without a reserve. A limit to the length of files (`ulimit -f`) is no limit
-//! to such a reserve, so it is looked at beforehand.
+//! The recorder reserves room with `fallocate`, which takes blocks of the file system and does not
+//! make the file longer. So a later write into this room cannot fail because the disk is full. Some
+//! file systems cannot reserve room; there the recorder writes without it. `ulimit -f` limits the
+//! length of a file but not such a reserve, so the recorder looks at that limit first.
 //!
-//! Somebody may remove the file or move it while it is written, or take its disk away. All writing
-//! succeeds then as before, so [`Disk::fate`] looks whether the file is still where it was made.
+//! Somebody may remove the file, move it, or take its disk away while the recorder writes. The
+//! system reports no error for that. So [`Disk::fate`] checks whether the file is still in its
+//! place.
 
 use std::fmt;
 use std::fs::{self, File, OpenOptions};
@@ -19,15 +20,15 @@ use rustix::fs::{FallocateFlags, fallocate};
 use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
-/// What is reserved at a time beyond what is needed, in bytes.
+/// How many bytes are reserved at a time, beyond the bytes that are needed.
 const AHEAD: u64 = 4 << 20;
 
-/// What has become of a file that is no longer where it was made.
+/// What happened to a file that is not in its place any more.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// It has no name any more.
+    /// Somebody removed it.
     Removed,
-    /// It has another name, if that is known.
+    /// Somebody moved it, here if the place is known.
     Moved(Option<PathBuf>),
 }
 
@@ -36,7 +37,7 @@ impl fmt::Display for Fate {
         match self {
             Self::Removed => write!(
                 formatter,
-                "was removed while it was recorded, and what it had is lost"
+                "was removed while it was recorded, and its samples are lost"
             ),
             Self::Moved(Some(to)) => write!(
                 formatter,
@@ -55,7 +56,7 @@ pub(crate) struct Disk {
     path: PathBuf,
     /// Bytes written.
     length: u64,
-    /// Bytes of the file for which there is room.
+    /// Bytes of the file, with the reserved room.
     reserved: u64,
 }
 
@@ -80,7 +81,7 @@ impl Disk {
         self.length
     }
 
-    /// Makes sure that the file may become so long.
+    /// Makes sure that the file may grow to this length.
     pub(crate) fn reserve(&mut self, length: u64) -> io::Result<()> {
         if length <= self.reserved {
             return Ok(());
@@ -91,7 +92,7 @@ impl Disk {
         }
         let more = length.saturating_add(AHEAD).min(most);
         let reserved = self.allocate(more).map(|()| more);
-        // The last few MiB of a disk are used as well.
+        // Use the last few MiB of a disk as well.
         let reserved = reserved.or_else(|_| self.allocate(length).map(|()| length));
         self.reserved = match reserved {
             Ok(reserved) => reserved,
@@ -117,7 +118,7 @@ impl Disk {
         Ok(())
     }
 
-    /// What has become of the file, if it is no longer where it was made.
+    /// What happened to the file, if it is not in its place any more.
     pub(crate) fn fate(&self) -> Option<Fate> {
         let own = self.file.metadata().ok()?;
         if own.nlink() == 0 {
@@ -146,18 +147,18 @@ impl Disk {
         device(fs::metadata(folder)) == device(self.file.metadata())
     }
 
-    /// Waits until what was written is on the disk.
+    /// Waits until the written bytes are on the disk.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.file.sync_data()
     }
 
-    /// Gives the room beyond the end back, and waits until all is on the disk.
+    /// Gives back the room beyond the end, and waits until everything is on the disk.
     pub(crate) fn finish(self) -> io::Result<()> {
         self.file.set_len(self.length)?;
         self.file.sync_all()
     }
 
-    /// Removes a file of which nothing is worth keeping.
+    /// Removes a file that has nothing worth keeping.
     pub(crate) fn remove(self) {
         let _ = std::fs::remove_file(&self.path);
     }
@@ -167,12 +168,12 @@ fn is_same(one: &fs::Metadata, other: &fs::Metadata) -> bool {
     (one.dev(), one.ino()) == (other.dev(), other.ino())
 }
 
-/// Whether there is nothing of that name.
+/// Whether this name is free.
 fn is_nothing(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
 }
 
-/// Whether there is no room, for this user or at all.
+/// Whether the disk has no room, for this user or for anybody.
 pub(crate) fn is_full(error: &io::Error) -> bool {
     matches!(
         error.kind(),

@@ -11,13 +11,13 @@ use crate::disk::{Fate, is_full};
 /// Why a recording ended early or did not begin.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// There is such a file.
+    /// The file exists already.
     #[error("{} is there already; choose another name, or move it away", path.display())]
     Exists {
         /// The file.
         path: PathBuf,
     },
-    /// No file can be made there.
+    /// The file cannot be made.
     #[error("cannot make {}: {error}", path.display())]
     Create {
         /// The file.
@@ -55,19 +55,19 @@ pub enum RecordError {
     Gone {
         /// The file.
         path: PathBuf,
-        /// What has become of it.
+        /// What happened to it.
         fate: Fate,
         /// The next file.
         next: PathBuf,
     },
-    /// Somebody took the file away, and no other one can be made in its place.
+    /// Somebody took the file away, and the recorder cannot make another one in its place.
     #[error("{} {fate}; the recording ends here: {why}", path.display())]
     GoneForGood {
         /// The file.
         path: PathBuf,
-        /// What has become of it.
+        /// What happened to it.
         fate: Fate,
-        /// Why there is no other file.
+        /// Why the recorder cannot make another file.
         why: Box<RecordError>,
     },
     /// The folder is now on another disk than the recording's first file.
@@ -99,13 +99,13 @@ pub enum RecordError {
     /// A topic cannot be read.
     #[error(transparent)]
     Receive(ReceiveError),
-    /// The bus cannot be looked at.
+    /// The state of the bus cannot be read.
     #[error(transparent)]
     Look(#[from] IntrospectError),
-    /// Nothing will come any more.
-    #[error("the bus was damaged and has been cleared since this began; start it again")]
+    /// The bus is another one now, so no sample will come any more.
+    #[error("the bus was damaged and replaced since this recording began; start it again")]
     Cleared,
-    /// There is no thread for the file.
+    /// The system gives no thread for the file.
     #[error("cannot start a thread: {0}")]
     Thread(io::Error),
 }
@@ -121,7 +121,7 @@ impl RecordError {
         }
     }
 
-    /// There was no room for more of a file, which can still be ended.
+    /// The file had no room for more. It can still be ended.
     pub(crate) fn full(path: &Path, error: &io::Error) -> Self {
         let path = path.to_owned();
         match error.kind() {

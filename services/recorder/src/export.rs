@@ -1,8 +1,9 @@
 //! `bag export --csv`: a table for each topic, for spreadsheets and scripts.
 //!
-//! A row is a message. Fields within fields are joined by dots, as in `failure.kind`; a list is one
-//! cell, as JSON. The first columns are the stamp's. A state's row that repeats the last sample from
-//! before the file comes first, with the number and the times that the sample had.
+//! A row is a message. A dot joins the names of nested fields, as in `failure.kind`. A list is one
+//! cell, as JSON. The first columns are those of the stamp. A file begins with the last earlier
+//! sample of each topic that carries a state; these rows come first, with their own numbers and
+//! times.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -17,11 +18,12 @@ use crate::bag::{Bag, BagError};
 /// The columns in front of the payload's.
 const STAMP: &str = "unix_ns,sequence,writer,epoch,source_time_ns,publish_time_ns,lost,dropped";
 
-/// Writes a table for each of `topics`, or of all if none are given, into the folder `to`, and
-/// names them.
+/// Writes a table for each of `topics` (for all if it is empty) into the folder `to`, and prints
+/// their names.
 ///
 /// # Errors
-/// The file cannot be read, has no such topic or is not ours, or a table cannot be written.
+/// The file cannot be read, does not have the topic, or is of another program; or a table cannot be
+/// written.
 pub fn export_csv(
     file: &Path,
     topics: &[String],
@@ -32,7 +34,7 @@ pub fn export_csv(
     let bag = Bag::open(file)?;
     let overview = bag.overview()?;
     bag.must_have(&overview, topics)?;
-    // What is derived for viewers is no table of samples.
+    // Derived messages are not samples.
     let samples = overview.topics.iter().filter(|topic| !topic.is_derived);
     let wanted = |name: &String| topics.is_empty() || topics.contains(name);
     let wanted = samples.map(|topic| topic.name.clone()).filter(wanted);
@@ -80,7 +82,7 @@ fn failed(path: &Path, error: io::Error) -> BagError {
 
 struct Table<W> {
     file: W,
-    /// The payload's columns, each as the names that lead there.
+    /// The payload's columns, each as a path of names.
     columns: Vec<Vec<String>>,
     rows: u64,
 }
@@ -128,7 +130,7 @@ impl<W: Write> Table<W> {
     }
 }
 
-/// The ways to every value that is made of no fields.
+/// The paths to all values that have no fields.
 fn columns(value: &Value, way: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
     match value {
         Value::Object(fields) => {

@@ -1,12 +1,13 @@
-//! The thread that writes: it takes what the listener has queued, and lets it survive.
+//! The thread that writes: it takes samples from the listener's queue and puts them on the disk.
 //!
-//! It sleeps for a flush period and then writes all that has come. So it costs few wake-ups, and a
-//! disk that is slow for a while fills the queue and nothing else. What it takes at once it sorts
-//! by time, so that a file is in order except across two flushes.
+//! It sleeps for a flush period and then writes all samples that have come. So it wakes seldom, and
+//! a slow disk only fills the queue. It sorts the samples of one flush by time, so a file is in
+//! order except between two flushes.
 //!
-//! It looks at each flush whether its file is still where it was made. One that somebody has
-//! removed or moved it ends, says so, and goes on in a new one in the same folder. If the folder is
-//! gone, or is on another disk now, the recording ends: nobody wants it on a disk that was not meant.
+//! At each flush it checks whether its file is still in its place. If somebody has removed or moved
+//! the file, it ends that file, reports it, and goes on in a new one in the same folder. If the
+//! folder is gone or is on another disk now, the recording ends, because nobody has chosen that
+//! disk.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -20,23 +21,23 @@ use crate::error::RecordError;
 use crate::part::{Earlier, Part, Refused};
 use crate::tally::{Held, Item, Notes, QueueOut, Topics};
 
-/// So many samples are taken at a time.
+/// How many samples it takes at a time.
 const BATCH: usize = 20_000;
 
-/// What a topic lacked when a file began, and by the last sample that is in it.
+/// How many samples a topic had lost when a file began, and by the file's last sample.
 #[derive(Clone, Copy, Default)]
 struct Missing {
     before: (u64, u64),
     now: (u64, u64),
 }
 
-/// What is left of a keeper.
-pub(crate) struct Kept {
+/// The result of a keeper.
+pub(crate) struct KeeperEnd {
     /// Its files.
     pub(crate) files: Vec<PathBuf>,
-    /// What ended the recording early, or what became of one of its files.
+    /// Why the recording ended early, or what happened to one of its files.
     pub(crate) result: Result<(), RecordError>,
-    /// Its end of the queue, into which the listener may still have put samples.
+    /// Its end of the queue. The listener may have put samples there after the last write.
     pub(crate) from: QueueOut,
 }
 
@@ -49,18 +50,18 @@ pub(crate) struct Keeper {
     notes: Notes,
     part: Part,
     ended: Vec<PathBuf>,
-    /// Bytes of the files that are ended.
+    /// Bytes of the finished files.
     ended_bytes: u64,
     missing: HashMap<usize, Missing>,
-    /// What viewers are shown.
+    /// Draws the messages for viewers.
     scene: Scene,
-    /// The last sample of each topic that holds, by the topic's place.
+    /// The last sample of each topic that carries a state, by the topic's place.
     held: BTreeMap<usize, Held>,
     /// When the calendar was set.
     steps: Vec<CalendarStep>,
     /// Log time of the last sample.
     log: u64,
-    /// What became of files that are gone.
+    /// What happened to files that somebody took away.
     gone: Option<RecordError>,
 }
 
@@ -98,8 +99,8 @@ impl Keeper {
         })
     }
 
-    /// Writes until the listener has ended, or it cannot go on.
-    pub(crate) fn run(mut self) -> Kept {
+    /// Writes until the listener has ended, or until it cannot go on.
+    pub(crate) fn run(mut self) -> KeeperEnd {
         let result = loop {
             let flush = Instant::now() + self.config.flush;
             let (items, is_over) = self.from.take(BATCH);
@@ -118,12 +119,12 @@ impl Keeper {
         files.extend(place_of(&self.part, self.part.fate().as_ref()));
         self.topics.drop_waiting(&self.from);
         let gone = self.gone.take();
-        // What could not be written cannot be ended either.
+        // A file that could not be written cannot be ended either.
         let (from, ended) = match &result {
             Err(RecordError::Write { .. }) => (self.from, Ok(())),
             _ => self.end(),
         };
-        Kept {
+        KeeperEnd {
             files,
             result: result.and(ended).and(gone.map_or(Ok(()), Err)),
             from,
@@ -136,7 +137,7 @@ impl Keeper {
         }
         for step in self.notes.steps() {
             match self.part.step(&step) {
-                // A disk that is full is told by the next sample.
+                // If the disk is full, the next sample reports it.
                 Ok(()) | Err(Refused::Full(_)) => self.steps.push(step),
                 Err(Refused::Failed(error)) => return Err(error),
             }
@@ -169,7 +170,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Ends this file and begins the next one. The queue holds what comes meanwhile.
+    /// Ends this file and begins the next one. New samples wait in the queue meanwhile.
     fn next_part(&mut self) -> Result<(), RecordError> {
         self.start.part += 1;
         let next = self.begin(&self.config.path(self.start.part))?;
@@ -182,7 +183,8 @@ impl Keeper {
         self.start.part += 1;
         let folder = path.parent().unwrap_or(Path::new(""));
         let next = match self.part.is_on_disk_of(folder) {
-            // A file of a number follows one of a number; else it has the same name, if that is free.
+            // The next file gets the next number, or the same name if files have no numbers and it
+            // is free.
             true => {
                 let name = RecordConfig {
                     file: self.config.path(self.start.part),
@@ -211,7 +213,7 @@ impl Keeper {
         self.go_on_in(next, Some(&fate))
     }
 
-    /// Begins the next file, which has what still holds.
+    /// Begins the next file with the last samples of the topics that carry a state.
     fn begin(&self, path: &Path) -> Result<Part, RecordError> {
         let mut held: Vec<Held> = self.held.values().cloned().collect();
         held.sort_by_key(|held| held.publish);
@@ -236,7 +238,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Ends the last file, with what was missed up to the listener's end.
+    /// Ends the last file, with the losses up to the listener's end.
     fn end(self) -> (QueueOut, Result<(), RecordError>) {
         let topics = self.topics.all().clone();
         let told = topics.iter().enumerate().map(|(place, topic)| {
@@ -252,7 +254,7 @@ impl Keeper {
     }
 }
 
-/// Begins with the first of the names that is not taken.
+/// Begins a file with the first free name.
 fn first_free(
     mut names: impl Iterator<Item = RecordConfig>,
     begin: impl Fn(&RecordConfig) -> Result<Part, RecordError>,
@@ -266,7 +268,7 @@ fn first_free(
     }
 }
 
-/// Where a file is, if it is anywhere.
+/// The full path of a file, if it has one.
 fn place_of(part: &Part, fate: Option<&Fate>) -> Option<PathBuf> {
     match fate {
         None => Some(part.path().to_owned()),

@@ -1,5 +1,5 @@
-//! The recorder: what is on the bus into a file, and what is in a file back onto a bus or into
-//! text.
+//! The recorder writes the samples of a bus into a file. It also reads such a file: it plays it
+//! onto a bus, or shows it as text.
 //!
 //! ```text
 //!   bus ──polls──> listener ──queue──> keeper ──> file            (record)
@@ -8,23 +8,24 @@
 //!   file ──> navigator ──> compared with the file                 (play --verify)
 //! ```
 //!
-//! It is an observer: it polls, wakes nobody and is woken by nobody, and costs a writer one queue
-//! entry. The structure of a file is `lager-journal`'s; here are threads, clocks and files.
+//! It is an observer: it polls, wakes nobody, and nobody wakes it. It costs each writer one queue
+//! entry. `lager-journal` knows the structure of a file; here are threads, clocks and files.
 //!
-//! **What is lost is counted, and where.** A sample may be overwritten before the listener looks
-//! (lost, from the stamps), or find the queue full because the disk is slow (dropped). Both stand
-//! in each message and in the file's counts.
+//! **It counts each sample that it misses, and where.** A sample is lost if its writer overwrites
+//! it before the listener looks; its stamp's number shows that. It is dropped if the queue is full
+//! because the disk is slow. Each message and the file's end have both counts.
 //!
-//! **What survives.** The keeper ends a chunk and calls `fdatasync` every 150 ms. A recorder
-//! that is killed loses at most what came since, and its file needs `lager bag recover`. On a full
-//! disk the file is ended in room that was reserved beforehand, so it is whole.
+//! **A killed recorder loses little.** The keeper ends a chunk and calls `fdatasync` every 150 ms.
+//! After a kill the samples since then are lost, and the file needs `lager bag recover`. On a full
+//! disk the keeper ends the file in the room that it has reserved, so the file is undamaged.
 //!
-//! **Each file can be used alone.** It begins with the last sample of every topic that holds, which
-//! stands in an earlier file as well and is in no count. A player that begins later than the
-//! recording publishes them, too.
+//! **Each file can be used alone.** It begins with the last sample of every topic that carries a
+//! state. These samples stand in an earlier file as well, so no count has them. A player that
+//! begins later than the recording publishes them, too.
 //!
-//! **A date is only as good as the machine's calendar.** One from before 2024 is called doubtful,
-//! and when the calendar is set meanwhile, that is told and stands in the file.
+//! **A date is only as good as the machine's calendar.** The recorder warns of a date before 2024.
+//! If somebody sets the calendar during the recording, the recorder reports it and writes it into
+//! the file.
 //!
 //! **A player moves nothing.** See `play.rs`.
 

@@ -1,40 +1,41 @@
-//! The thread that polls the bus: it takes samples out of it as JSON, and queues them.
+//! The thread that polls the bus: it turns samples into JSON and queues them for the keeper.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use lager_home::{BusWatch, Clock};
 use lager_journal::{Envelope, EnvelopeSchema, Times};
-use lager_ports::{
-    Bus, BusWatch, Clock, Layout, Look, Pace, PortError, ReceiveError, Source, Watchdog,
-};
-use lager_topics::{Description, Stamp, TOPICS, Topic as TableTopic, TopicVisitor, visit};
+use lager_ports::{Bus, Layout, Look, PortError, ReceiveError, Source};
+use lager_sample::{Description, Stamp, Topic as TableTopic};
+use lager_topics::{TOPICS, TopicVisitor, visit};
+use lager_wake::{Pace, Watchdog};
 use serde::Serialize;
 
 use crate::error::RecordError;
 use crate::tally::{Item, QueueIn, Topic, Topics};
 
-/// So many samples of one topic are taken before the next topic has its turn.
+/// How many samples of one topic it takes before the next topic has its turn.
 const TURN: u64 = 1_024;
 
-/// Everything that is listened to.
+/// All topics that it listens to.
 pub(crate) struct Listener<'a> {
     pub(crate) bus: &'a Bus,
     pub(crate) watchdog: &'a Watchdog,
     pub(crate) topics: Topics,
-    /// Topics that are wanted; empty for all.
+    /// The topics that the user wants; empty for all.
     pub(crate) wanted: &'a [String],
     pub(crate) times: Timing,
     pub(crate) queue: QueueIn,
     pub(crate) feeds: Vec<Box<dyn Feed>>,
-    /// Topics that are listened to, or cannot be.
+    /// The topics that it listens to, or has found unreadable.
     pub(crate) known: BTreeSet<String>,
     pub(crate) services: BusWatch,
 }
 
-/// How stamps become times of the file.
+/// Turns the times of stamps into times of the file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Timing {
-    /// What is added to a stamp's time to get ns since 1970.
+    /// The difference between ns since 1970 and a stamp's time.
     pub(crate) offset_ns: i64,
     /// When the recording began, by the stamps' clock.
     pub(crate) began_ns: u64,
@@ -51,9 +52,9 @@ impl Timing {
     }
 }
 
-/// A topic that is listened to.
+/// A topic that it listens to.
 pub(crate) trait Feed {
-    /// Queues what has come, and tells how full the topic's queue was.
+    /// Queues the new samples, and says how full the topic's queue was.
     fn drain(&mut self, queue: &QueueIn, pace: &mut Pace) -> Result<(), RecordError>;
 }
 
@@ -62,10 +63,10 @@ impl Listener<'_> {
         self.wanted.is_empty() || self.wanted.iter().any(|wanted| wanted == name)
     }
 
-    /// Opens the topics of the table, whether somebody writes them yet or not. Returns why some of
-    /// them cannot be recorded; one that was asked for by name is an error.
+    /// Opens the topics of the table, also those that nobody writes yet. Returns why some of them
+    /// cannot be recorded. For a topic that the user has named this is an error.
     pub(crate) fn open_table(&mut self) -> Result<Vec<String>, RecordError> {
-        // All of them together: each could wait for a bus that does not answer.
+        // One limit for all: each could wait for a bus that does not answer.
         let watchdog = self.watchdog;
         watchdog.over("opening the topics", || self.open_each())
     }
@@ -89,15 +90,15 @@ impl Listener<'_> {
         Ok(refused)
     }
 
-    /// Opens topics of other people's that have come. Returns why some cannot be recorded.
+    /// Opens new topics of other programs. Returns why some cannot be recorded.
     pub(crate) fn look_for_more(&mut self) -> Result<Vec<String>, RecordError> {
         let mut refused = Vec::new();
-        if !self.services.has_changed(self.bus.place()) {
+        if !self.services.has_changed(self.bus.home()) {
             return Ok(refused);
         }
         let look = || self.bus.topics();
         for topic in self.watchdog.over("listing the topics", look)? {
-            let is_new = topic.robot == *self.bus.robot()
+            let is_new = topic.unit == *self.bus.unit()
                 && topic.entry.is_none()
                 && self.wants(&topic.name)
                 && !self.known.contains(&topic.name);
@@ -119,7 +120,7 @@ impl Listener<'_> {
                     let feed = self.feed(found, &name, schema);
                     self.feeds.push(feed);
                 }
-                // It went while it was looked at, and may come back.
+                // It disappeared meanwhile, and may come back.
                 Ok(None) => {
                     self.known.remove(&name);
                 }
@@ -129,14 +130,14 @@ impl Listener<'_> {
         Ok(refused)
     }
 
-    /// Topics that were asked for and are not there.
+    /// The topics that the user has named and that do not exist.
     pub(crate) fn absent(&self) -> Vec<String> {
         let wanted = self.wanted.iter();
         let absent = wanted.filter(|name| !self.known.contains(*name));
         absent.cloned().collect()
     }
 
-    /// Queues what has come on every topic.
+    /// Queues the new samples of every topic.
     pub(crate) fn drain(&mut self, pace: &mut Pace) -> Result<(), RecordError> {
         self.watchdog.enter("reading the topics");
         let drained = self

@@ -1,4 +1,4 @@
-//! `bag info` and `bag check`: what a file is, and whether it is what was written.
+//! `bag info` and `bag check`: what a file contains, and whether it is undamaged.
 
 use std::io::Write;
 use std::path::Path;
@@ -111,13 +111,13 @@ fn table(overview: &Overview, seconds: f64, out: &mut impl Write) -> Result<(), 
     Ok(())
 }
 
-/// What is to be said of a file's dates: whether they are doubtful, and when the calendar was set.
+/// Remarks about a file's dates: whether they are doubtful, and when the calendar was set.
 fn dates(begin_ns: u64, steps: &[CalendarStep]) -> Vec<String> {
     let set = steps.iter().map(|step| set(step, begin_ns));
     doubt(begin_ns).into_iter().chain(set).collect()
 }
 
-/// That a date, in ns since 1970, cannot be believed, if it cannot.
+/// A remark if a date in ns since 1970 is doubtful.
 pub fn doubt(unix_ns: u64) -> Option<String> {
     is_doubtful(unix_ns).then(|| {
         let date = utc(unix_ns);
@@ -127,7 +127,7 @@ pub fn doubt(unix_ns: u64) -> Option<String> {
     })
 }
 
-/// That the calendar was set while something went on that began at `begin_ns`.
+/// A remark that the calendar was set during a recording that began at `begin_ns`.
 pub(crate) fn set(step: &CalendarStep, begin_ns: u64) -> String {
     let after = step.at_ns.saturating_sub(begin_ns) as f64 / 1e9;
     let begin = utc(step.corrected(begin_ns));
@@ -153,8 +153,8 @@ fn rate(topic: &TopicOverview, seconds: f64) -> f64 {
     }
 }
 
-/// `bag check`: reads all of a file, compares every CRC, every number and its own sums, and says
-/// what is wrong. Returns whether nothing is.
+/// `bag check`: reads the whole file, compares every CRC, every number and the file's own counts,
+/// and prints the faults. Returns whether there is none.
 ///
 /// # Errors
 /// The file cannot be read, or the output cannot be written.

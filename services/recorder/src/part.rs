@@ -12,10 +12,10 @@ use crate::disk::{Disk, Fate, is_full};
 use crate::error::RecordError;
 use crate::tally::{Held, Item, Topic, Topics};
 
-/// A chunk is ended when it has so many bytes, flush or not.
+/// The recorder ends a chunk that has so many bytes, without waiting for the flush.
 const CHUNK: u64 = 1 << 20;
-/// Room for whatever describes one topic, in a chunk and again in the index. A topic describes
-/// itself in 1792 bytes at most, and its schema takes less than ten times as many.
+/// Room for the description of one topic, in a chunk and again in the index. A topic describes
+/// itself in at most 1792 bytes, and its schema takes less than ten times as many.
 const DESCRIBED: u64 = 128 << 10;
 
 /// One file of a recording.
@@ -23,18 +23,18 @@ pub(crate) struct Part {
     journal: Journal,
     disk: Disk,
     topics: Topics,
-    channels: HashMap<usize, Kept>,
+    channels: HashMap<usize, StoredTopic>,
     views: BTreeMap<View, Channel>,
-    /// What was before this file and still holds; it has it after its first sample has come.
+    /// The state from before this file. The file gets it with its first sample.
     earlier: Option<Earlier>,
     begun: Instant,
     bytes: Vec<u8>,
 }
 
-/// What was before a file.
+/// The state from before a file.
 #[derive(Clone, Default)]
 pub(crate) struct Earlier {
-    /// The last sample of each topic that holds.
+    /// The last sample of each topic that carries a state.
     pub(crate) held: Vec<Held>,
     /// When the calendar was set.
     pub(crate) steps: Vec<CalendarStep>,
@@ -42,15 +42,15 @@ pub(crate) struct Earlier {
     pub(crate) log: u64,
 }
 
-/// What the file has of one topic.
-struct Kept {
+/// What the file knows of one topic.
+struct StoredTopic {
     channel: Channel,
     stored: u64,
 }
 
 /// Why a sample is not in the file.
 pub(crate) enum Refused {
-    /// There is no room for it, and there is room for the file's end.
+    /// The disk has no room for it. There is room for the file's end.
     Full(RecordError),
     /// The file cannot be written.
     Failed(RecordError),
@@ -91,12 +91,12 @@ impl Part {
         self.disk.length()
     }
 
-    /// How long it has been written to.
+    /// For how long the recorder has written to it.
     pub(crate) fn age(&self) -> Duration {
         self.begun.elapsed()
     }
 
-    /// Adds a sample, and what `scene` makes of it.
+    /// Adds a sample, and the messages that `scene` derives from it.
     pub(crate) fn write(&mut self, item: &Item, scene: &mut Scene) -> Result<(), Refused> {
         let mut shown = Vec::new();
         if self.earlier.is_some() {
@@ -113,7 +113,7 @@ impl Part {
         kept.map_err(Refused::Failed)
     }
 
-    /// Makes room for so many bytes more than those of the file that is ended now.
+    /// Makes room for so many bytes more than the file would need if it ended now.
     fn reserve(&mut self, more: u64) -> Result<(), Refused> {
         let room = self.journal.length() + self.journal.room(more);
         match self.disk.reserve(room) {
@@ -125,7 +125,7 @@ impl Part {
         }
     }
 
-    /// Puts what was before this file at its beginning: when it begins with a sample, at `log`.
+    /// Writes the earlier state at the file's beginning, when its first sample comes, at `log`.
     fn begin_with_earlier(&mut self, log: Option<u64>) -> Result<(), Refused> {
         let Some(Earlier {
             held,
@@ -158,14 +158,14 @@ impl Part {
         Ok(())
     }
 
-    /// Notes that the calendar was set.
+    /// Writes that the calendar was set.
     pub(crate) fn step(&mut self, step: &CalendarStep) -> Result<(), Refused> {
         self.reserve(Journal::room_for_a_step())?;
         let noted = self.journal.step(step);
         noted.map_err(|error| Refused::Failed(error.into()))
     }
 
-    /// What has become of the file, if it is no longer where it was made.
+    /// What happened to the file, if it is not in its place any more.
     pub(crate) fn fate(&self) -> Option<Fate> {
         self.disk.fate()
     }
@@ -175,7 +175,7 @@ impl Part {
         self.disk.is_on_disk_of(folder)
     }
 
-    /// What is derived stands beside the samples and is counted as none.
+    /// Writes derived messages beside the samples. No count has them.
     fn show(&mut self, item: &Item, shown: &[Shown]) -> Result<(), RecordError> {
         for Shown { view, message } in shown {
             let channel = match self.views.get(view) {
@@ -197,7 +197,8 @@ impl Part {
             let topic = self.topics.at(item.topic);
             let channel = self.journal.topic(&topic.name, &topic.schema)?;
             let stored = 0;
-            self.channels.insert(item.topic, Kept { channel, stored });
+            self.channels
+                .insert(item.topic, StoredTopic { channel, stored });
         }
         let kept = self.channels.get_mut(&item.topic).expect("just made");
         let number = item.sequence;
@@ -211,7 +212,7 @@ impl Part {
         Ok(())
     }
 
-    /// Ends the chunk that is open and waits until it is on the disk.
+    /// Ends the open chunk and waits until it is on the disk.
     pub(crate) fn flush(&mut self) -> Result<(), RecordError> {
         self.journal.flush()?;
         if self.journal.length() > self.disk.length() {
@@ -228,8 +229,8 @@ impl Part {
         written.map_err(|error| self.failed(error))
     }
 
-    /// Ends the file. `missing` says of each topic, by its place, how many of its samples were lost
-    /// and dropped while this file was written.
+    /// Ends the file. `missing` says for each topic, by its place, how many of its samples were
+    /// lost and dropped while the recorder wrote this file.
     pub(crate) fn end(mut self, missing: &HashMap<usize, (u64, u64)>) -> Result<u64, RecordError> {
         if let Err(Refused::Failed(error)) = self.begin_with_earlier(None) {
             return Err(error);
@@ -266,7 +267,7 @@ impl Part {
     }
 }
 
-/// Bytes of what describes one topic.
+/// Bytes of the description of one topic.
 fn described(topic: &Topic) -> u64 {
     (topic.schema.text.len() + topic.schema.name.len() + 2 * topic.name.len()) as u64 + 512
 }

@@ -1,66 +1,67 @@
-//! `bag play`: a recording onto the bus of a robot that is not up.
+//! `bag play`: plays a recording onto the bus of a robot that is not up.
 //!
-//! **A player never moves a robot.** While it plays it holds the locks of that robot's supervisor
-//! and of its bridge, which alone writes to the boards. So it refuses a robot that is up, and none
-//! of that name can be started until it ends. It also refuses a topic that somebody else writes,
-//! because readers would see two worlds at once. Programs that only read may run: they see the
-//! recording as if the robot were there.
+//! **A player never moves a robot.** While it plays, it holds the locks of that robot's supervisor
+//! and bridge, and only the bridge writes to the boards. So it refuses a robot that is up, and no
+//! robot of that name can start until it ends. It also refuses a topic that somebody else writes,
+//! because readers would see two worlds at once. Programs that only read may run. For them the
+//! recording looks like a robot.
 //!
-//! Stamps are new unless told otherwise, so that what looks at a sample's age sees a living robot.
-//! With the recorded ones readers see writer, number and times of then. Those times are of the
-//! machine's clock since its start: after a restart of the machine they may lie ahead, and readers
-//! count no losses in such a stream.
+//! The player makes new stamps, so readers that check a sample's age see a living robot. With
+//! `--stamps recorded` readers see the writer, number and times of the recording. Those times count
+//! from the start of the machine: after a restart of the machine they may lie in the future, and
+//! readers count no losses in such a stream.
 //!
-//! Where it begins later than the recording, it first publishes the last sample before that moment
-//! of every topic that holds, so that readers know the warehouse, the orders and the mode of then.
+//! If the player begins later than the recording, it first publishes the last earlier sample of
+//! every topic that carries a state. So readers know the warehouse, the orders and the mode of that
+//! moment.
 //!
-//! A user's own topic is played onto the bus of those who have it open, laid out as its creator
-//! says. One that nobody has open when the player starts is not played: nobody would hear it, and a
-//! recording does not say how many may write and read it, nor how many samples may wait there.
+//! The player plays a topic of other programs only if such a program has it open, and with the
+//! layout of the program that created it. If nobody has it open when the player starts, nobody
+//! would read it; and a recording does not say how many programs may write and read it.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use lager_home::LockError;
 use lager_journal::{Envelope, EnvelopeSchema, Overview, Selection};
-use lager_ports::{
-    AnyPublisher, Bus, IntrospectError, LockError, PortError, SendError, Shutdown, Watchdog,
-};
+use lager_ports::{AnyPublisher, Bus, IntrospectError, PortError, SendError};
 use lager_topics::Role;
+use lager_wake::{Shutdown, Watchdog};
 use serde_json::Value;
 
 use crate::bag::{Bag, BagError};
 
-/// How long readers get to find the player before its first sample, and to take the last ones.
+/// How long the player waits for readers before its first sample and after its last one.
 const MEET: Duration = Duration::from_millis(300);
-/// How often the wish to end is looked at, and late readers get the states.
+/// How often the player checks for its end, and sends the states to late readers.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Which stamps samples get.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stamps {
-    /// The player's own, as of now.
+    /// New stamps of this moment.
     #[default]
     New,
     /// Those of the recording.
     Recorded,
 }
 
-/// What is played and how.
+/// What to play, and how.
 #[derive(Clone, Debug)]
 pub struct PlayConfig {
     /// The recording.
     pub file: PathBuf,
-    /// Names of topics; empty for all that this build knows or somebody has open.
+    /// Names of topics. Empty means all that this build knows or somebody has open.
     pub topics: Vec<String>,
-    /// How many times as fast as it was recorded.
+    /// The speed; 1 is that of the recording.
     pub rate: f64,
-    /// Begin anew at the end, until somebody wishes the end.
+    /// Whether to begin again after the end, until somebody ends it.
     pub repeat: bool,
-    /// Where to begin, from the recording's begin.
+    /// Where to begin, from the recording's beginning.
     pub from: Duration,
-    /// Where to end, from the recording's begin.
+    /// Where to end, from the recording's beginning.
     pub to: Option<Duration>,
     /// Which stamps.
     pub stamps: Stamps,
@@ -88,23 +89,23 @@ pub enum PlayError {
         /// Who writes it.
         writer: String,
     },
-    /// Samples of then do not fit into samples of now.
+    /// The recording's samples have another layout than today's.
     #[error(
-        "{topic} was recorded by another build, whose samples have other fields; play it with that \
-         build, or play other topics with --topic"
+        "{topic} was recorded by another version of lager, whose samples have other fields; play it \
+         with that version, or play other topics with --topic"
     )]
     Layout {
         /// The topic.
         topic: String,
     },
-    /// None of what was asked for can be played.
+    /// None of the wished topics can be played.
     #[error("there is nothing to play: {why}")]
     Nothing {
         /// Why.
         why: String,
     },
-    /// A message is not readable.
-    #[error("{topic}: a message is not readable ({error}); `lager bag check` says more")]
+    /// A message cannot be read.
+    #[error("{topic}: a message cannot be read ({error}); `lager bag check` says more")]
     Message {
         /// The topic.
         topic: String,
@@ -117,21 +118,22 @@ pub enum PlayError {
     /// A sample cannot be sent.
     #[error(transparent)]
     Send(#[from] SendError),
-    /// The bus cannot be looked at.
+    /// The state of the bus cannot be read.
     #[error(transparent)]
     Look(#[from] IntrospectError),
 }
 
-/// What was played.
+/// What the player has played.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Played {
     /// Samples.
     pub samples: u64,
-    /// Whether it came to the end, rather than to somebody's wish.
+    /// Whether it reached the end, and nobody ended it before.
     pub is_done: bool,
 }
 
-/// Plays until the end, or until `shutdown` is requested. `begun` is told once what is not played.
+/// Plays until the end, or until `shutdown` is requested. Calls `begun` once, with what it does not
+/// play.
 ///
 /// # Errors
 /// The file cannot be read, the robot is up, or somebody else writes one of the topics.
@@ -145,12 +147,12 @@ pub fn play(
     let bag = Bag::open(&config.file)?;
     let overview = bag.overview()?;
     bag.must_have(&overview, &config.topics)?;
-    let robot = bus.robot();
-    // Held until the last sample is out. A bridge that is just ending is waited for.
-    let _name = bus.place().lock_name(robot)?;
-    let _bridge = bus.place().lock(robot, Role::Bridge)?;
+    let robot = bus.unit();
+    // Held until the last sample has left. The player waits for a bridge that is just ending.
+    let _name = bus.home().lock_name(robot)?;
+    let _bridge = bus.home().lock(robot, Role::Bridge)?;
     let is_wanted = |name: &String| config.topics.is_empty() || config.topics.contains(name);
-    // What viewers look at is made of the other topics.
+    // The messages for viewers are derived from the other topics.
     let topics = overview.topics.iter().filter(|topic| !topic.is_derived);
     let topics = topics.map(|topic| topic.name.clone());
     let wanted: Vec<String> = topics.filter(is_wanted).collect();
@@ -163,7 +165,7 @@ pub fn play(
 
     let held = held(&bag, &overview, &selection, &writers)?;
     let mut played = Played::default();
-    let pace = Pace {
+    let pace = RealTime {
         shutdown,
         writers: &writers,
         ticked: Cell::new(Instant::now()),
@@ -208,7 +210,7 @@ pub fn play(
     Ok(played)
 }
 
-/// Opens the topics that this build or somebody on the bus knows.
+/// Opens the topics that this build knows or somebody on the bus has open.
 fn open(bus: &Bus, overview: &Overview, wanted: &[String]) -> Result<Writers, PlayError> {
     let mut writers = Writers::new();
     for topic in &overview.topics {
@@ -227,7 +229,7 @@ fn open(bus: &Bus, overview: &Overview, wanted: &[String]) -> Result<Writers, Pl
     Ok(writers)
 }
 
-/// The topics that are played, and the times between which.
+/// The topics to play, and between which times.
 fn select(
     config: &PlayConfig,
     overview: &Overview,
@@ -246,8 +248,8 @@ fn select(
     })
 }
 
-/// The last sample before the selection begins of each topic that holds, the oldest first: who
-/// looks at a state then sees what it was.
+/// The last sample before the selection of each topic that carries a state, the oldest first. So a
+/// reader of a state sees what it was at that moment.
 fn held(
     bag: &Bag,
     overview: &Overview,
@@ -271,23 +273,20 @@ fn held(
 fn must_be_free(bus: &Bus, wanted: &[String]) -> Result<(), PlayError> {
     bus.sweep();
     for topic in bus.topics()? {
-        let is_wanted = topic.robot == *bus.robot() && wanted.contains(&topic.name);
+        let is_wanted = topic.unit == *bus.unit() && wanted.contains(&topic.name);
         let Some(writer) = topic.writers.first().filter(|_| is_wanted) else {
             continue;
         };
-        let role = writer
-            .role
-            .map_or("a stranger".to_owned(), |role| role.to_string());
         return Err(PlayError::Written {
             topic: topic.name,
-            robot: bus.robot().to_string(),
-            writer: format!("{role}, process {}", writer.pid),
+            robot: bus.unit().to_string(),
+            writer: format!("{}, process {}", writer.who(), writer.pid),
         });
     }
     Ok(())
 }
 
-/// The topics that are played, by their names.
+/// The topics to play, by their names.
 type Writers = BTreeMap<String, AnyPublisher>;
 
 fn send(writer: &AnyPublisher, message: &[u8], stamps: Stamps) -> Result<(), PlayError> {
@@ -307,19 +306,19 @@ fn send(writer: &AnyPublisher, message: &[u8], stamps: Stamps) -> Result<(), Pla
 }
 
 /// Waits in real time.
-struct Pace<'a> {
+struct RealTime<'a> {
     shutdown: &'a Shutdown,
     writers: &'a Writers,
-    /// When readers who have come were last looked for.
+    /// When the player last looked for new readers.
     ticked: Cell<Instant>,
 }
 
-impl Pace<'_> {
-    /// Whether that moment came before the wish to end.
+impl RealTime<'_> {
+    /// Waits for that moment. Returns false if somebody ends the player before.
     fn rest_until(&self, moment: Instant) -> bool {
         loop {
-            // However many samples there are: a reader of a topic that holds gets its last one by
-            // this, and no sample of it may come any more.
+            // Do this however fast samples come: only here a new reader of a state gets the last
+            // sample, and the topic may have no later one.
             if self.ticked.get().elapsed() >= LOOK {
                 self.writers.values().for_each(AnyPublisher::tick);
                 self.ticked.set(Instant::now());

@@ -1,4 +1,5 @@
-//! `bag record`: the listener in this thread, the keeper in another, until somebody wishes the end.
+//! `bag record`: runs the listener in this thread and the keeper in another, until somebody ends
+//! it.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -6,8 +7,10 @@ use std::sync::mpsc::sync_channel;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use lager_home::{BusWatch, Clock};
 use lager_journal::{Calendar, Count, Start};
-use lager_ports::{Bus, BusWatch, Clock, Pace, Shutdown, Watchdog};
+use lager_ports::Bus;
+use lager_wake::{Pace, Shutdown, Watchdog};
 
 use crate::config::RecordConfig;
 use crate::error::RecordError;
@@ -16,7 +19,7 @@ use crate::listener::{Listener, Timing};
 use crate::look::{doubt, set};
 use crate::tally::{Notes, Topics, queue};
 
-/// How often it tells how things stand, and looks for topics that have come.
+/// How often it reports, and looks for new topics.
 const TELL: Duration = Duration::from_secs(1);
 
 /// One topic while it is recorded.
@@ -24,21 +27,21 @@ const TELL: Duration = Duration::from_secs(1);
 pub struct LiveCount {
     /// Its name.
     pub name: String,
-    /// What became of its samples so far.
+    /// What happened to its samples so far.
     pub count: Count,
 }
 
-/// How a recording stands.
+/// The state of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Progress {
-    /// Since it began.
+    /// How long it runs.
     pub time: Duration,
-    /// On the disk, in all files.
+    /// Bytes on the disk, in all files.
     pub bytes: u64,
     /// In the order in which they were found.
     pub topics: Vec<LiveCount>,
-    /// What a person should know: topics that cannot be recorded, a file that somebody has taken
-    /// away, dates that are doubtful. Each is told once.
+    /// Warnings: topics that cannot be recorded, a file that somebody has taken away, doubtful
+    /// dates. Each comes once.
     pub news: Vec<String>,
 }
 
@@ -60,19 +63,19 @@ impl Progress {
 pub struct Recorded {
     /// Its files.
     pub files: Vec<PathBuf>,
-    /// How it stood at the end.
+    /// Its state at the end.
     pub progress: Progress,
-    /// Topics that were asked for and never came.
+    /// Topics that the user has named and that never came.
     pub absent: Vec<String>,
-    /// What ended it before somebody wished so.
+    /// Why it ended before somebody ended it.
     pub ended_by: Option<RecordError>,
 }
 
 /// Records until `shutdown` is requested, and calls `tell` once a second.
 ///
 /// # Errors
-/// The file cannot be made, or a topic that was asked for cannot be opened. What ends a recording
-/// later is in [`Recorded::ended_by`].
+/// The file cannot be made, or a topic that the user has named cannot be opened. If a recording
+/// ends later, the reason is in [`Recorded::ended_by`].
 pub fn record(
     bus: &Bus,
     watchdog: &Watchdog,
@@ -87,7 +90,7 @@ pub fn record(
         began_ns: Clock::monotonic_ns(),
     };
     let start = Start {
-        robot: bus.robot().to_string(),
+        robot: bus.unit().to_string(),
         part: 0,
         unix_offset_ns: times.offset_ns,
     };
@@ -99,7 +102,7 @@ pub fn record(
     }
     let keeper = {
         let (config, topics, notes) = (config.clone(), topics.clone(), notes.clone());
-        // A journal stays in its thread, so that thread makes it and says whether it could.
+        // A journal stays in one thread, so that thread makes it and reports whether it could.
         let (ready, is_ready) = sync_channel(1);
         let run = move || match Keeper::new(&config, start, &topics, from, &notes) {
             Ok(keeper) => {
@@ -160,7 +163,7 @@ pub fn record(
     keeper.thread().unpark();
     let kept = keeper.join().expect("the keeper does not panic");
     let kept = kept.expect("it has said that it could begin");
-    // A keeper that could not go on has left what came while it ended its file.
+    // If the keeper could not go on, the samples after its last write are still in the queue.
     topics.drop_waiting(&kept.from);
     Ok(Recorded {
         files: kept.files,

@@ -1,4 +1,4 @@
-//! `bag recover`: a whole copy of what is left of a file.
+//! `bag recover`: copies the undamaged parts of a file into a new one.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -10,12 +10,12 @@ use crate::bag::{Bag, BagError};
 use crate::disk::Disk;
 use crate::look::report;
 
-/// Copies every whole chunk of `file` to `copy` (beside it, as `NAME.recovered.mcap`, unless
-/// given), reads the copy again, and says what it has. The file itself is not touched.
+/// Copies every undamaged chunk of `file` to `copy`, reads the copy again, and prints its content.
+/// Without `copy` it writes `NAME.recovered.mcap` beside the file. The file itself does not change.
 ///
 /// # Errors
-/// The file cannot be read or has nothing to recover, the copy is there already or cannot be
-/// written, or the output cannot be written.
+/// The file cannot be read or has nothing to recover, the copy exists already or cannot be written,
+/// or the output cannot be written.
 pub fn recover(
     file: &Path,
     copy: Option<&Path>,
@@ -27,7 +27,7 @@ pub fn recover(
     let mut check = Check::default();
     let learnt = bag.walk(Learnt::default(), &mut check)?;
     let found = check.finish();
-    // Messages outside of chunks are whole, and can be neither played nor exported.
+    // Messages outside of chunks are undamaged, but cannot be played or exported from there.
     if found.faults.is_empty() && !(found.is_ours && found.has_loose) {
         if !found.is_ours {
             return Err(BagError::Foreign { path });

@@ -1,10 +1,10 @@
-//! Every sample of a recording in the order of its time, for tools that show one.
+//! Every sample of a recording, in the order of time.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use lager_journal::{Envelope, EnvelopeSchema, Selection, TopicOverview};
-use lager_topics::Description;
+use lager_sample::Description;
 use serde_json::Value;
 
 use crate::bag::{Bag, BagError};
@@ -16,13 +16,13 @@ pub struct FileSample<'a> {
     pub robot: &'a str,
     /// The topic.
     pub topic: &'a str,
-    /// Whether it was sent before the file began, and stands in an earlier one as well.
+    /// Whether it is repeated from an earlier file.
     pub is_repeated: bool,
-    /// The message. What it says to be missing is what this file lacks up to it.
+    /// The message. Its losses count from the beginning of this file.
     pub envelope: Envelope<Value>,
 }
 
-/// Hands each sample over. Returns the layout of each topic whose layout the file has.
+/// Calls a function with each sample. Returns the layouts of the topics, where the file has them.
 ///
 /// # Errors
 /// The file cannot be read, was cut off, or another program recorded it.
@@ -36,11 +36,11 @@ pub fn samples(
         path: file.to_owned(),
     };
     let start = overview.start.as_ref().ok_or_else(foreign)?;
-    // A message counts from the recording's begin. What was missing before a later file is not
-    // known of each topic; that file counts from its first sample.
+    // A message counts losses from the recording's beginning. A later file does not say them for
+    // each topic, so they count from the topic's first sample in that file.
     let mut before: BTreeMap<String, (u64, u64)> = BTreeMap::new();
     bag.ordered(&overview, &Selection::default(), |placed| {
-        // What is in the same file and no sample of a topic is passed over.
+        // Skip derived messages.
         if let Ok(mut envelope) = serde_json::from_slice::<Envelope<Value>>(placed.message) {
             if placed.is_repeated {
                 (envelope.lost, envelope.dropped) = (0, 0);

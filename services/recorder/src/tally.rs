@@ -1,5 +1,5 @@
-//! What listener and keeper share: the topics with their counts, the queue between them, and what
-//! they tell each other.
+//! Shared by listener and keeper: the topics with their counts, the queue between them, and their
+//! messages to each other.
 
 use std::mem;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lager_journal::{CalendarStep, Count, EnvelopeSchema, Times};
 
-/// Messages may wait with so many bytes together.
+/// How many bytes of messages may wait together.
 const QUEUE_BYTES: u64 = 64 << 20;
 
 /// A topic that is recorded.
@@ -16,7 +16,7 @@ const QUEUE_BYTES: u64 = 64 << 20;
 pub(crate) struct Topic {
     pub(crate) name: String,
     pub(crate) schema: EnvelopeSchema,
-    /// Whether its last sample holds for those who come later, and so for later files.
+    /// Whether it carries a state, so that later files repeat its last sample.
     pub(crate) holds: bool,
     received: AtomicU64,
     lost: AtomicU64,
@@ -43,12 +43,12 @@ impl Topic {
         }
     }
 
-    /// Notes a sample that was received.
+    /// Counts a received sample.
     pub(crate) fn receive(&self) {
         self.received.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Notes how many were missed so far.
+    /// Sets how many samples were lost so far.
     pub(crate) fn lose(&self, lost: u64) {
         self.lost.store(lost, Ordering::Relaxed);
     }
@@ -58,7 +58,7 @@ impl Topic {
     }
 }
 
-/// The topics in the order in which they were found; a message has its topic's place.
+/// The topics, in the order in which they were found. A message names its topic by this place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Topics(Arc<Mutex<Vec<Arc<Topic>>>>);
 
@@ -74,7 +74,7 @@ impl Topics {
         Arc::clone(&self.all()[place])
     }
 
-    /// Notes that what waits reaches no file.
+    /// Counts the samples that still wait as dropped.
     pub(crate) fn drop_waiting(&self, queue: &QueueOut) {
         for item in queue.take(usize::MAX).0 {
             self.at(item.topic).drop_one();
@@ -86,15 +86,15 @@ impl Topics {
     }
 }
 
-/// What both tell each other besides samples; clones share it.
+/// The messages between the two, besides samples; all clones share it.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Notes(Arc<Told>);
+pub(crate) struct Notes(Arc<NoteBoard>);
 
 #[derive(Debug, Default)]
-struct Told {
-    /// On the disk, in all files.
+struct NoteBoard {
+    /// Bytes on the disk, in all files.
     bytes: AtomicU64,
-    /// What a person should know.
+    /// Warnings for a person.
     news: Mutex<Vec<String>>,
     /// When the calendar was set.
     steps: Mutex<Vec<CalendarStep>>,
@@ -113,7 +113,7 @@ impl Notes {
         locked(&self.0.news).push(news);
     }
 
-    /// What has been told; it is then no longer here.
+    /// Takes the warnings.
     pub(crate) fn news(&self) -> Vec<String> {
         mem::take(&mut locked(&self.0.news))
     }
@@ -122,7 +122,7 @@ impl Notes {
         locked(&self.0.steps).push(step);
     }
 
-    /// Steps that have come; they are then no longer here.
+    /// Takes the new steps of the calendar.
     pub(crate) fn steps(&self) -> Vec<CalendarStep> {
         mem::take(&mut locked(&self.0.steps))
     }
@@ -143,7 +143,7 @@ pub(crate) struct Item {
     pub(crate) message: Vec<u8>,
 }
 
-/// The last sample of a topic that holds.
+/// The last sample of a topic that carries a state.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
     pub(crate) topic: usize,
@@ -178,7 +178,7 @@ pub(crate) struct QueueOut {
     waiting: Arc<AtomicU64>,
 }
 
-/// A queue of so many samples.
+/// A queue for so many samples.
 pub(crate) fn queue(samples: usize) -> (QueueIn, QueueOut) {
     let (to, from) = sync_channel(samples);
     let waiting = Arc::new(AtomicU64::new(0));
@@ -193,7 +193,7 @@ pub(crate) fn queue(samples: usize) -> (QueueIn, QueueOut) {
 }
 
 impl QueueIn {
-    /// Puts it in, unless the queue is full or nobody takes from it any more.
+    /// Adds a sample, unless the queue is full or the keeper has gone.
     pub(crate) fn put(&self, item: Item) -> bool {
         let bytes = item.message.len() as u64;
         let before = self.waiting.fetch_add(bytes, Ordering::Relaxed);
@@ -210,7 +210,7 @@ impl QueueIn {
 }
 
 impl QueueOut {
-    /// All that waits, at most so many; the flag says that nothing will come any more.
+    /// Takes the samples that wait, at most so many. The flag says that no more will come.
     pub(crate) fn take(&self, most: usize) -> (Vec<Item>, bool) {
         use std::sync::mpsc::TryRecvError;
         let mut items = Vec::new();

@@ -1,4 +1,4 @@
-//! `bag play --verify`: a recording of what the navigator was told, told to a navigator once more.
+//! `bag play --verify`: gives the recorded inputs of a navigator to a new one, and compares.
 //!
 //! ```text
 //!   nav/inputs ──> navigator of this build ──> its answer <── compared ──> the entry's order, proof
@@ -6,18 +6,19 @@
 //!                     steering/command, nav/status, mission/event <── compared, byte by byte
 //! ```
 //!
-//! `nav/inputs` alone proves a run: each entry has the order that was in force after it and a proof
-//! of all the rest. The samples of the three topics are compared as well, as far as the recording
-//! has them: `nav/inputs` says which number each of them has, so a lost one shifts no other.
+//! `nav/inputs` alone proves a run: each entry has the order that was in force after it, and a
+//! check value of everything else. The verifier also compares the samples of the three topics,
+//! where the recording has them. `nav/inputs` says the number of each such sample, so a lost one
+//! does not shift the others.
 //!
-//! A navigator is followed from its start, since only there all of its state is told. Later
-//! `nav/status` holds only the part with which a successor goes on: neither how far a manoeuvre has
-//! come, nor what was seen of wheels, line and distance. With that part alone the same inputs lead
-//! to other orders. So where a recording begins later, or pieces are missing, nothing is compared
-//! until the next navigator starts; [`Verified::gaps`] says where.
+//! The verifier follows a navigator from its start, because only there the recording has all of its
+//! state. A later `nav/status` holds only the part that a successor needs. It does not say how far
+//! a manoeuvre has come, nor what the navigator has seen of wheels, line and distance. Without
+//! these the same inputs lead to other orders. So if a recording begins later, or pieces are
+//! missing, the verifier waits for the next start of a navigator; [`Verified::gaps`] says where.
 //!
-//! `frames_lost` in a status counts what the shell has missed, which no navigator knows. It is not
-//! compared.
+//! `frames_lost` in a status counts frames that the shell has missed. No navigator knows them, so
+//! the verifier does not compare this count.
 
 mod outcome;
 mod rerun;
@@ -26,7 +27,8 @@ mod samples;
 use std::path::Path;
 
 use lager_journal::{Envelope, Selection, Times};
-use lager_topics::{NavInputs, TextKind, Told, ToldInputs, ToldKind, Topic, bytes_of};
+use lager_sample::{Topic, bytes_of};
+use lager_topics::{NavInputs, NavigatorInput, NavigatorInputKind, NavigatorInputs, TextKind};
 
 use crate::bag::Bag;
 pub use outcome::{
@@ -35,11 +37,11 @@ pub use outcome::{
 pub use rerun::{Did, Rerun};
 use samples::{Samples, must_fit, read};
 
-/// Tells a navigator what the file says, and compares what it does until a command differs, or to
-/// the end.
+/// Gives a navigator the recorded inputs, and compares what it does, until a command differs or the
+/// recording ends.
 ///
 /// # Errors
-/// The file cannot be read or has no inputs, or another build wrote it.
+/// The file cannot be read or has no inputs, or another version of this program wrote it.
 pub fn verify(file: &Path, rerun: &mut dyn Rerun) -> Result<Verified, VerifyError> {
     let bag = Bag::open(file)?;
     let overview = bag.overview()?;
@@ -49,7 +51,7 @@ pub fn verify(file: &Path, rerun: &mut dyn Rerun) -> Result<Verified, VerifyErro
         .iter()
         .find(|topic| topic.name == NavInputs::NAME);
     let topic = topic.ok_or(VerifyError::NoInputs)?;
-    must_fit::<ToldInputs>(NavInputs::NAME, &topic.schema_text)?;
+    must_fit::<NavigatorInputs>(NavInputs::NAME, &topic.schema_text)?;
     for topic in &overview.topics {
         samples::must_fit_as_compared(&topic.name, &topic.schema_text)?;
     }
@@ -71,12 +73,12 @@ pub fn verify(file: &Path, rerun: &mut dyn Rerun) -> Result<Verified, VerifyErro
         verified: Verified::default(),
     };
     bag.ordered(&overview, &selection, |placed| {
-        // Nothing in this file leads to what was sent before it began.
+        // Samples from before the file have no inputs in it.
         if placed.is_repeated {
             return Ok(true);
         }
         if placed.topic == NavInputs::NAME {
-            let envelope = read::<ToldInputs>(NavInputs::NAME, placed.message)?;
+            let envelope = read::<NavigatorInputs>(NavInputs::NAME, placed.message)?;
             follower.piece(&envelope, placed.times)
         } else {
             follower.samples.keep(placed.topic, placed.message)?;
@@ -87,15 +89,15 @@ pub fn verify(file: &Path, rerun: &mut dyn Rerun) -> Result<Verified, VerifyErro
     Ok(follower.verified)
 }
 
-/// Whose inputs are followed.
+/// Whose inputs the verifier follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Follows {
-    /// Nobody's, until the next navigator begins.
+    /// Nobody's, until the next navigator starts.
     Nothing,
-    /// A navigator's whose pieces came one after the other from its begin.
+    /// Those of a navigator whose pieces have come without a gap since its start.
     Navigator,
-    /// The same, after something differed: only its first command that differs is looked for, and
-    /// if none does, that of the next navigator.
+    /// The same, after a first difference. The verifier now looks only for the first command that
+    /// differs, of this navigator or of the next one.
     Apart,
 }
 
@@ -113,10 +115,10 @@ struct Follower<'a> {
 }
 
 impl Follower<'_> {
-    /// Takes a piece. Whether to go on.
+    /// Takes a piece. Returns whether to go on.
     fn piece(
         &mut self,
-        envelope: &Envelope<ToldInputs>,
+        envelope: &Envelope<NavigatorInputs>,
         times: Times,
     ) -> Result<bool, VerifyError> {
         let (stamp, piece) = (&envelope.stamp, &envelope.payload);
@@ -159,8 +161,8 @@ impl Follower<'_> {
         if piece.entries_used > 0 {
             let moved = self.samples.begin_piece(piece);
             if self.follows == Follows::Navigator && moved.is_some() {
-                let told = piece.entries()[0];
-                self.differ(at_ns, &told, &told, moved);
+                let first = piece.entries[0];
+                self.differ(at_ns, &first, &first, moved);
             }
         }
         self.entries(piece, at_ns)
@@ -172,7 +174,7 @@ impl Follower<'_> {
         self.verified.gaps.push(Gap { at_ns, why, inputs });
     }
 
-    fn take_text(&mut self, piece: &ToldInputs) -> Result<(), VerifyError> {
+    fn take_text(&mut self, piece: &NavigatorInputs) -> Result<(), VerifyError> {
         self.text.extend_from_slice(piece.text());
         if piece.text_left > 0 {
             return Ok(());
@@ -190,20 +192,14 @@ impl Follower<'_> {
         Ok(())
     }
 
-    fn entries(&mut self, piece: &ToldInputs, at_ns: u64) -> Result<bool, VerifyError> {
-        let mut reports = piece.reports().iter();
-        for told in piece.entries() {
-            let report = match told.kind.get() {
-                Some(ToldKind::Steering) => reports.next(),
-                _ => None,
-            };
-            let did = self
-                .rerun
-                .handle(told, report)
-                .map_err(VerifyError::Rerun)?;
+    fn entries(&mut self, piece: &NavigatorInputs, at_ns: u64) -> Result<bool, VerifyError> {
+        for (entry, beside) in piece.entries() {
+            let did = self.rerun.handle(entry, beside);
+            let did = did.map_err(VerifyError::Rerun)?;
+            let kind = entry.kind.get();
             if !matches!(
-                told.kind.get(),
-                Some(ToldKind::Renewed | ToldKind::Repeated)
+                kind,
+                Some(NavigatorInputKind::Renewed | NavigatorInputKind::Repeated)
             ) {
                 self.verified.inputs += 1;
             }
@@ -211,8 +207,8 @@ impl Follower<'_> {
                 Follows::Navigator => self.samples.compare(&did),
                 _ => None,
             };
-            if bytes_of(told) != bytes_of(&did.told) || sample.is_some() {
-                self.differ(at_ns, told, &did.told, sample);
+            if bytes_of(entry) != bytes_of(&did.entry) || sample.is_some() {
+                self.differ(at_ns, entry, &did.entry, sample);
             }
             self.next_entry += 1;
             if self.verified.first_command.is_some() {
@@ -222,11 +218,17 @@ impl Follower<'_> {
         Ok(true)
     }
 
-    fn differ(&mut self, at_ns: u64, told: &Told, now: &Told, sample: Option<SampleDifference>) {
+    fn differ(
+        &mut self,
+        at_ns: u64,
+        recorded: &NavigatorInput,
+        now: &NavigatorInput,
+        sample: Option<SampleDifference>,
+    ) {
         let difference = Difference {
             number: self.next_entry,
             at_ns,
-            recorded: *told,
+            recorded: *recorded,
             now: *now,
             sample,
         };

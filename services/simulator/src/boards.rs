@@ -1,7 +1,7 @@
-//! The two boards' pins: `impl Board` by arithmetic.
+//! The pins of the simulated boards: two implementations of `Board` by arithmetic.
 //!
-//! These types only pass on: every decision is in `lager_control`, every number of the body in
-//! `lager_plant`.
+//! These types only pass values on: `lager_control` makes every decision, and `lager_plant` has
+//! every number of the body.
 
 use core::time::Duration;
 
@@ -12,22 +12,22 @@ use lager_wire::ResetCause;
 use crate::exde::ExDe;
 use crate::uart::Uart;
 
-/// How long the chip takes to write a byte of its EEPROM.
+/// The time that the chip needs to write a byte of its EEPROM.
 const EEPROM_WRITE_NS: u64 = 3_400_000;
 
-/// What every board has beside its pins.
+/// The parts of a board beside its pins.
 #[derive(Clone, Debug)]
 pub(crate) struct Chip {
     pub(crate) uart: Uart,
     pub(crate) cause: ResetCause,
-    /// When its clock started, in ns of robot time.
+    /// The time when its clock started, in ns of robot time.
     pub(crate) boot_ns: u64,
-    /// When its loop last kicked the watchdog.
+    /// The time when its loop last reset the watchdog's timer, in ns of robot time.
     pub(crate) kicked_ns: u64,
     pub(crate) now_ns: u64,
-    /// Outlives every reset.
+    /// The EEPROM; a reset does not change it.
     pub(crate) eeprom: [u8; EEPROM_LENGTH as usize],
-    /// When the byte being written is.
+    /// The time when the byte that is being written is finished, in ns of robot time.
     pub(crate) eeprom_free_ns: u64,
 }
 

@@ -1,8 +1,9 @@
-//! What a person does to calibrate the line sensors: asks the board, as `lager calibrate` does, and
-//! moves the robot over tape and floor by hand until the board says that it is done (E9).
+//! Calibrates the line sensors of a simulated robot as a person does: asks the board, as `lager
+//! calibrate` does, and moves the robot over tape and floor by hand until the board says that it is
+//! done (E9).
 //!
-//! It talks to the board over its serial line; the bridge that takes the robot over afterwards
-//! begins with a handshake. It never tells the board what the thresholds are.
+//! It talks to the board over its serial line; the bridge that uses the line afterwards begins with
+//! a handshake. It never tells the board the thresholds.
 
 use core::f64::consts::TAU;
 use core::time::Duration;
@@ -14,22 +15,22 @@ use thiserror::Error;
 
 use crate::robot::{Robot, Wire};
 
-/// How far the array is moved to either side, in mm: the outermost sensors come over the tape.
+/// How far it moves the array to either side, in mm: the outermost sensors come over the tape.
 const SWAY: f64 = 60.0;
 /// Time of one move to and fro, in s.
 const PERIOD: f64 = 1.6;
-/// How often the board is asked until it answers.
+/// The time between two requests to the board, until it answers.
 const ASK: Duration = Duration::from_millis(200);
-/// How long it may take.
+/// The longest time that a calibration may take.
 const LIMIT: Duration = Duration::from_secs(12);
-/// Time the board needs to keep what it has found.
+/// The time that the board needs to save the thresholds.
 const KEEP: Duration = Duration::from_millis(500);
 const STEP: Duration = Duration::from_millis(1);
 
 /// Why the sensors are not calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum CalibrateError {
-    /// No answer.
+    /// The board does not answer.
     #[error("the sensor board does not answer; is its cable in?")]
     Silent,
     /// Some sensors saw no contrast.
@@ -37,7 +38,7 @@ pub enum CalibrateError {
         "only {channels} of 11 line sensors saw floor and tape apart; move all of them over the tape, or lay darker tape"
     )]
     NoContrast {
-        /// Sensors that did.
+        /// The number of sensors that saw both tape and floor.
         channels: i16,
     },
 }

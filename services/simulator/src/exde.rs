@@ -1,4 +1,4 @@
-//! The wires of ExDe and both ends as the boards' interrupts drive them.
+//! The three wires of ExDe and both their ends, as the boards' interrupts drive them.
 //!
 //! ```text
 //!   sensor board                            steering board
@@ -6,13 +6,13 @@
 //!                  timer  ^                     |  timer
 //!                         '----- return sync ---'
 //! ```
-//! Interrupts go on while a board's main loop hangs; in reset its end is gone.
+//! Interrupts still come while a board's main loop hangs; a board in reset has no end.
 
 use std::collections::VecDeque;
 
-use lager_exde::{Action, Receiver, Step, Timing, Transmitter};
+use lager_exde::{Receiver, Step, Timing, Transmitter, WireAction};
 
-/// Words the steering board's interrupt can keep before its loop looks.
+/// The number of words that the steering board's interrupt keeps for its loop.
 const WORDS: usize = 4;
 const TIMING: Timing = Timing::STANDARD;
 const NS_PER_US: u64 = 1_000;
@@ -32,21 +32,21 @@ struct Listener {
     last_pulse_ns: u64,
 }
 
-/// The three wires between the boards (X2) and their ends.
+/// The three wires between the boards (X2), and both ends.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ExDe {
     sender: Option<Sender>,
     listener: Option<Listener>,
     data: bool,
     words: VecDeque<(u16, u32)>,
-    /// Whether a word has come since the steering board was stepped.
+    /// Whether a word has arrived since the steering board's last step.
     pub(crate) arrived: bool,
-    /// Whether a word has left since the sensor board was stepped.
+    /// Whether a word has left since the sensor board's last step.
     pub(crate) sent: bool,
 }
 
 impl ExDe {
-    /// The sensor board begins.
+    /// The sensor board starts.
     pub(crate) fn start_sender(&mut self, now: u64) {
         self.sender = Some(Sender {
             transmitter: Transmitter::new(),
@@ -54,7 +54,7 @@ impl ExDe {
         });
     }
 
-    /// The steering board begins.
+    /// The steering board starts.
     pub(crate) fn start_receiver(&mut self) {
         self.listener = Some(Listener {
             receiver: Receiver::new(),
@@ -77,7 +77,7 @@ impl ExDe {
         self.arrived = false;
     }
 
-    /// When a timer runs out next.
+    /// The time of the next timer interrupt, in ns.
     pub(crate) fn next_event(&self) -> u64 {
         let sender = self.sender.as_ref().and_then(|sender| sender.due_ns);
         let listener = self
@@ -87,7 +87,7 @@ impl ExDe {
         sender.unwrap_or(u64::MAX).min(listener.unwrap_or(u64::MAX))
     }
 
-    /// The interrupts that are due; `receiver_us` is the steering board's clock.
+    /// Runs the interrupts that are due; `receiver_us` is the steering board's clock.
     pub(crate) fn interrupt(&mut self, now: u64, receiver_us: u32) {
         if let Some(listener) = &mut self.listener
             && listener.silence_ns.is_some_and(|at| at <= now)
@@ -107,7 +107,7 @@ impl ExDe {
         }
     }
 
-    /// Begins to send a word, if the sender takes one.
+    /// Begins to send a word; false if the sender takes none.
     pub(crate) fn send(&mut self, word: u16, now: u64) -> bool {
         let step = self
             .sender
@@ -115,7 +115,7 @@ impl ExDe {
             .and_then(|sender| sender.transmitter.start(word));
         match step {
             Some(step) => {
-                // The first step of a word sets data and never makes a pulse.
+                // The first step of a word only sets the data wire and makes no pulse.
                 self.carry_out(step, now, 0);
                 true
             }
@@ -123,19 +123,19 @@ impl ExDe {
         }
     }
 
-    /// Whether bits of a word are still to be sent.
+    /// Whether the sender still has bits of a word.
     pub(crate) fn is_sending(&self) -> bool {
         self.sender
             .as_ref()
             .is_some_and(|sender| sender.transmitter.is_sending())
     }
 
-    /// The oldest word the steering board has not read.
+    /// The oldest word that the steering board has not read, with its time.
     pub(crate) fn word(&mut self) -> Option<(u16, u32)> {
         self.words.pop_front()
     }
 
-    /// What the receiver has counted.
+    /// The receiver's count of errors.
     pub(crate) fn errors(&self) -> u8 {
         self.listener
             .as_ref()
@@ -147,13 +147,13 @@ impl ExDe {
             sender.due_ns = step.wait_us.map(|us| now + u64::from(us) * NS_PER_US);
         }
         match step.action {
-            Action::Nothing => {}
-            Action::Place(level) => self.data = level,
-            Action::Release => {
+            WireAction::Nothing => {}
+            WireAction::Place(level) => self.data = level,
+            WireAction::Release => {
                 self.data = false;
                 self.sent = true;
             }
-            Action::Pulse => self.sample(now, receiver_us),
+            WireAction::Pulse => self.sample(now, receiver_us),
         }
     }
 

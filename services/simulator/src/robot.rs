@@ -1,4 +1,4 @@
-//! The robot: world, both boards and their wires, driven by events in virtual time.
+//! The pure robot: its world, both boards and their wires, driven by events in virtual time.
 //!
 //! ```text
 //!   Pi <==serial line==> sensor board ---ExDe---> steering board <==serial line==> Pi
@@ -6,12 +6,13 @@
 //!                         line, IR                motors  servos
 //!                             '------- World --------'------'
 //! ```
-//! Between two events nothing changes that a board could notice, so time jumps from event to
-//! event: a step a board asked for, a byte that has arrived, the end of a transmission, an edge
-//! on ExDe. At the same instant the sensor board comes first. A run depends on the warehouse, the
-//! options and the bytes written and when, not on how the caller cuts the time.
+//! Between two events nothing changes that a board could notice, so time jumps from event to event.
+//! Events are a step that a board asked for, a byte that arrives, the end of a transmission, and an
+//! edge on ExDe. At the same instant the sensor board comes first. A run depends on the warehouse,
+//! the options, and the written bytes with their times; it does not depend on how the caller
+//! divides the time.
 //!
-//! It never reads a clock and decides nothing the boards decide.
+//! It reads no clock, and makes none of the boards' decisions.
 
 use core::time::Duration;
 
@@ -19,41 +20,42 @@ use lager_ax12::table::MAX_POSITION;
 use lager_control::{SensorConfig, SensorUnit, SteeringConfig, SteeringUnit};
 use lager_plant::arm::SERVOS;
 use lager_plant::noise::Noise;
-use lager_plant::{HandsOff, Make, Pose, Warehouse, WarehouseError, World, WorldState};
+use lager_plant::{
+    Hand, HandsOff, Make, Pose, Snapshot, Warehouse, WarehouseError, World, WorldState,
+};
 use lager_wire::{ArmProfile, ResetCause};
 
 use crate::boards::{SensorPins, SteeringPins};
 use crate::exde::ExDe;
-use crate::hands::Wish;
 use crate::running::{Running, START_UP_NS};
 use crate::uart::Uart;
 
 /// The middle of a servo's range.
 const REST: u16 = 512;
-/// The stream of noise that spreads the boards' first loops.
+/// The number of the random stream that spreads the boards' first loops.
 const START_STREAM: u64 = 100;
 
-/// The two serial lines, named for the boards at their ends.
+/// The two serial lines, each with the name of its board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Wire {
-    /// To the sensor board.
+    /// The line to the sensor board.
     Sensor,
-    /// To the steering board.
+    /// The line to the steering board.
     Steering,
 }
 
-/// How a robot is built.
+/// The options of a robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RobotOptions {
-    /// Chooses every imperfection: the same seed is the same robot.
+    /// The seed of every imperfection: the same seed is the same robot.
     pub seed: u64,
-    /// How many things come and go on the floor.
+    /// The number of things that come and go on the floor.
     pub obstacles: u32,
-    /// Which imperfections there are.
+    /// Which imperfections the robot has.
     pub make: Make,
     /// Baud rate of both serial lines.
     pub baud: u32,
-    /// What the boards say why they started.
+    /// The reason that the boards give for their first start.
     pub cause: ResetCause,
     /// The sensor board's constants.
     pub sensor: SensorConfig,
@@ -75,17 +77,6 @@ impl Default for RobotOptions {
     }
 }
 
-/// How the robot really is; its own boards do not know it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Snapshot {
-    /// Everything that is worth keeping.
-    pub world: WorldState,
-    /// Duties at the left and the right motor driver, negative backwards.
-    pub duties: [i16; 2],
-    /// The product in the claw.
-    pub carrying: Option<i32>,
-}
-
 /// A robot in its warehouse.
 #[derive(Debug)]
 pub struct Robot {
@@ -95,12 +86,12 @@ pub struct Robot {
     exde: ExDe,
     options: RobotOptions,
     now_ns: u64,
-    /// When the world makes its next step.
+    /// The time of the world's next step.
     world_due_ns: u64,
 }
 
 impl Robot {
-    /// A robot at the start of a warehouse, its boards about to start.
+    /// A robot at the start of a warehouse; its boards are about to start.
     ///
     /// # Errors
     /// The warehouse cannot be built, or has no room for things on its ways.
@@ -121,7 +112,7 @@ impl Robot {
         })
     }
 
-    /// Goes on from a kept world. The boards start anew, at the kept time.
+    /// Continues in a saved world. The boards start again, at the saved time.
     pub fn resume(&mut self, state: &WorldState) {
         self.world.restore(state);
         self.now_ns = state.time.as_nanos() as u64;
@@ -135,7 +126,7 @@ impl Robot {
         Duration::from_nanos(self.now_ns)
     }
 
-    /// Advances to `now`; what lies behind is ignored.
+    /// Advances to `now`; does nothing if `now` is in the past.
     pub fn advance_to(&mut self, now: Duration) {
         let target = now.as_nanos() as u64;
         loop {
@@ -151,8 +142,8 @@ impl Robot {
         self.settle(target);
     }
 
-    /// Advances until a packet has wholly arrived at the Pi, at most to `limit`; the time
-    /// reached. Cheaper than asking after every event.
+    /// Advances until a whole packet has arrived at the Pi, at most to `limit`, and returns the
+    /// time reached. This takes less processor time than a look after every event.
     pub fn advance_to_output(&mut self, limit: Duration) -> Duration {
         let limit = limit.as_nanos() as u64;
         loop {
@@ -181,24 +172,24 @@ impl Robot {
         }
     }
 
-    /// When something happens next.
+    /// The time of the next event.
     pub fn next_event(&self) -> Duration {
         Duration::from_nanos(self.next_of_boards().min(self.exde.next_event()))
     }
 
-    /// The Pi writes to a board; the bytes leave at the baud rate from now on.
+    /// Bytes that the Pi writes to a board. They go over the line at the baud rate from now on.
     pub fn write(&mut self, wire: Wire, bytes: &[u8]) {
         let now = self.now_ns;
         self.uart(wire).write(now, bytes);
     }
 
-    /// Appends what has arrived at the Pi by now.
+    /// Appends the bytes that have arrived at the Pi by now.
     pub fn read(&mut self, wire: Wire, into: &mut Vec<u8>) {
         let now = self.now_ns;
         self.uart(wire).read(now, into);
     }
 
-    /// How the robot really is.
+    /// The true state of the robot and its world.
     pub fn truth(&self) -> Snapshot {
         Snapshot {
             world: WorldState {
@@ -226,7 +217,7 @@ impl Robot {
         }
     }
 
-    /// Lets a board's program hang; its watchdog will reset it.
+    /// Makes a board's program hang; its watchdog will reset it.
     pub fn hang_board(&mut self, wire: Wire) {
         match wire {
             Wire::Sensor => self.sensor.hung = self.sensor.unit.is_some(),
@@ -240,41 +231,36 @@ impl Robot {
         self.uart(wire).set_cut(cut, now);
     }
 
-    /// Noise on the way to the Pi; it arrives now.
+    /// Bytes of noise that arrive at the Pi now.
     pub fn disturb_pi(&mut self, wire: Wire, bytes: &[u8]) {
         let now = self.now_ns;
         self.uart(wire).disturb_pi(now, bytes);
     }
 
-    /// Puts the robot somewhere, at rest.
+    /// Puts the robot at `pose`, at rest.
     pub fn place(&mut self, pose: Pose) {
         self.world.place(pose);
     }
 
-    /// Does what a person's hands would do.
+    /// Changes the world as a person's hands would.
     ///
     /// # Errors
-    /// Why they leave the world as it is.
-    pub fn obey(&mut self, wish: Wish) -> Result<(), HandsOff> {
-        match wish {
-            Wish::Place(pose) => self.place(pose),
-            Wish::Put(edge) => self.world.put_obstacle(edge)?,
-            Wish::Take(edge) => self.world.take_obstacle(edge)?,
-        }
-        Ok(())
+    /// The reason why the world stays as it is.
+    pub fn obey(&mut self, hand: Hand) -> Result<(), HandsOff> {
+        hand.act(&mut self.world)
     }
 
-    /// The world, for what tests and tools want to know of it.
+    /// The world, for tests and tools that read it.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// The world, for faults that tests put into it.
+    /// The world, for tests that put faults into it.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
     }
 
-    /// Bytes lost on a serial line for want of a reader, of room or of a cable.
+    /// The number of bytes lost on a serial line because a reader, room or the cable was missing.
     pub fn dropped(&self, wire: Wire) -> u64 {
         match wire {
             Wire::Sensor => self.sensor.chip.uart.dropped(),
@@ -289,7 +275,7 @@ impl Robot {
         }
     }
 
-    /// When a board notices something next, other than a word on ExDe.
+    /// The time of the next event of a board, other than a word on ExDe.
     fn next_of_boards(&self) -> u64 {
         let servo = match (self.steering.unit.is_some(), self.world.next_servo_byte()) {
             (true, Some(at)) => at.as_nanos() as u64,
@@ -302,8 +288,8 @@ impl Robot {
             .min(servo)
     }
 
-    /// Lets the wires of ExDe run until `before`; whether a board noticed it, and then no farther.
-    /// Of the steps that a word takes the boards notice only its end.
+    /// Runs the wires of ExDe until `before`, or until a board notices something; returns whether
+    /// one did. Of a word's steps, boards notice only the last.
     fn run_wires(&mut self, before: u64) -> bool {
         while self.exde.next_event() < before {
             let now = self.exde.next_event().max(self.now_ns);
@@ -317,7 +303,7 @@ impl Robot {
         false
     }
 
-    /// Moves the time without an event.
+    /// Advances the time, without an event of a board.
     fn settle(&mut self, now: u64) {
         if now > self.now_ns {
             self.now_ns = now;
@@ -328,7 +314,7 @@ impl Robot {
         }
     }
 
-    /// Everything that happens at `at`, or at present where that lies behind.
+    /// Handles everything that happens at `at`, or now if `at` is in the past.
     fn handle(&mut self, at: u64) {
         let now = at.max(self.now_ns);
         self.settle(now);
@@ -344,7 +330,7 @@ impl Robot {
         self.step_boards(now);
     }
 
-    /// Lets the boards work that want to, the sensor board first.
+    /// Steps the boards that have work, the sensor board first.
     fn step_boards(&mut self, now: u64) {
         if self.sensor.wants(now, self.exde.sent) {
             self.step_sensor(now);
@@ -393,7 +379,7 @@ impl Robot {
     }
 }
 
-/// Where the servos stand before anybody has moved them: the neutral pose, the claw open.
+/// The servos' first positions: the neutral pose, with the claw open.
 fn resting_arm(arm: &ArmProfile) -> [u16; SERVOS] {
     let pose = arm.neutral;
     let facing = |position: u16| MAX_POSITION - position;

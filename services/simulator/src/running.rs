@@ -1,4 +1,4 @@
-//! When a board runs: start-up, the steps of its loop, its watchdog.
+//! A running board: its start-up, the steps of its loop, and its watchdog.
 //!
 //! ```text
 //!                start-up over              step, step, ...
@@ -8,7 +8,7 @@
 //!      '---------------------------hung      reset, any time v
 //!      '----------------------------------------------------'
 //! ```
-//! The same for both boards; what is on their pins is in [`crate::boards`].
+//! Both boards use it; [`crate::boards`] has their pins.
 
 use lager_control::EEPROM_LENGTH;
 use lager_wire::ResetCause;
@@ -16,21 +16,21 @@ use lager_wire::ResetCause;
 use crate::boards::Chip;
 use crate::uart::Uart;
 
-/// A board is out of reset this long after its cause: the chip's start-up time with the fuses
+/// The time from the cause of a reset until the board runs: the chip's start-up time with the fuses
 /// for slowly rising power.
 pub(crate) const START_UP_NS: u64 = 65_000_000;
-/// A board's loop takes at least this long, whatever it asks for.
+/// The shortest time of a board's loop, even if the program asks for an earlier step.
 const SHORTEST_LOOP_NS: u64 = 10_000;
-/// The watchdog's time: the motors go off, then the board starts anew.
+/// The watchdog's time. After it the motors go off, and then the board starts again.
 const WATCHDOG_NS: u64 = 64_000_000;
 
 /// A board with its program.
 #[derive(Clone, Debug)]
 pub(crate) struct Running<Unit> {
-    /// Nothing while the board is held in reset.
+    /// `None` while the board is held in reset.
     pub(crate) unit: Option<Unit>,
     pub(crate) chip: Chip,
-    /// When the program wants its next step, or begins.
+    /// The time of the program's next step, or of its start.
     pub(crate) due_ns: u64,
     /// Whether the program has stopped looping.
     pub(crate) hung: bool,
@@ -64,7 +64,7 @@ impl<Unit> Running<Unit> {
         }
     }
 
-    /// Holds the board in reset and lets it start again.
+    /// Resets the board; it starts again after the start-up time.
     pub(crate) fn reset(&mut self, now: u64, cause: ResetCause) {
         self.unit = None;
         self.hung = false;
@@ -77,18 +77,18 @@ impl<Unit> Running<Unit> {
         self.chip.uart.restart_board(now);
     }
 
-    /// The board's own clock; it runs while the board does.
+    /// The board's own clock, which runs only while the board does.
     pub(crate) fn clock_us(&self, now: u64) -> u32 {
         (now.saturating_sub(self.chip.boot_ns) / 1_000) as u32
     }
 
-    /// Whether the board's loop has something to do; `input` is what else its interrupts saw.
+    /// Whether the board's loop has work; `input` says that another interrupt saw something.
     pub(crate) fn wants(&self, now: u64, input: bool) -> bool {
         let arrived = self.chip.uart.next_event(self.chip.now_ns) <= now;
         !self.hung && (now >= self.due_ns || self.unit.is_some() && (input || arrived))
     }
 
-    /// Notes when the unit wants its next step.
+    /// Sets the time of the unit's next step.
     pub(crate) fn plan(&mut self, wanted_us: u32) {
         let ahead = wanted_us.wrapping_sub(self.clock_us(self.chip.now_ns)) as i32;
         let ahead_ns = u64::from(ahead.max(0).unsigned_abs()) * 1_000;
@@ -101,8 +101,7 @@ impl<Unit> Running<Unit> {
         self.hung && now >= self.chip.kicked_ns + WATCHDOG_NS
     }
 
-    /// The board comes to an instant in which it works; nothing sent to it during its reset has
-    /// arrived.
+    /// Brings the board to the time of a step. Bytes sent to it during its reset are lost.
     pub(crate) fn come_to(&mut self, now: u64) {
         if self.unit.is_none() {
             self.chip.uart.restart_board(now);

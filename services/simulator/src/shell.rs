@@ -1,4 +1,4 @@
-//! The simulated robot as a process.
+//! The simulated robot as a process, with ports, a bus and the clock.
 //!
 //! ```text
 //!         sleep until input, or until something happens, at least 0.5 ms
@@ -7,56 +7,56 @@
 //!                                  |--> truth/pose, 50 times a second and when goods change state
 //!                                  '<-- world/request: what a person's hands would do
 //! ```
-//! Robot time is the bus's clock, so it runs at the speed of everybody else's. The loop works in
-//! batches, which costs little processor time and delays a byte by no more than a batch.
+//! Robot time is the bus's clock, so the robot runs at the same speed as all services. The loop
+//! works in batches: it uses little processor time, and delays a byte by at most one batch.
 //!
-//! While this process gets no core, its world stands still. A world that made up for lost time would
-//! drive on under commands that it could not hear meanwhile, and on a machine that is too slow for
-//! it each batch would take longer than the one before.
+//! While this process gets no core, its world stands still. If the world caught up, the robot would
+//! drive on with old commands that nobody could change meanwhile. On a machine that is too slow,
+//! each batch would then also take longer than the one before.
 
 use core::time::Duration;
 use std::path::PathBuf;
 
+use lager_home::Clock;
 use lager_plant::{Warehouse, WarehouseError};
-use lager_ports::{
-    Bus, Cause, Clock, PortError, Publisher, ReceiveError, SendError, Server, Shutdown,
-};
+use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, SendError, Server};
 use lager_pty::{Port, PtyError};
 use lager_topics::{TruthPose, WorldRequest};
+use lager_wake::Shutdown;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
 
-use crate::hands::{answer, wish};
 use crate::robot::{Robot, RobotOptions, Wire};
 use crate::truth::{message, world_state};
+use crate::world_requests::{answer, wish};
 
 /// The shortest sleep between two batches, in real time.
 const BATCH: Duration = Duration::from_micros(500);
-/// The longest sleep, in real time; also how late an opened port is noticed.
+/// The longest sleep, in real time. The process notices an opened port after at most this time.
 const LONGEST_SLEEP: Duration = Duration::from_millis(5);
-/// How much the world makes up for at once, in real time; more than that it has stood still.
+/// How much real time the world catches up with at once; for the rest it has stood still.
 const MADE_UP: Duration = Duration::from_millis(50);
-/// From one truth to the next, in robot time.
+/// The time between two samples of `truth/pose`, in robot time.
 const TRUTH_PERIOD: Duration = Duration::from_millis(20);
-/// How long a restarted simulator waits for its last truth, in real time.
+/// How long a restarted simulator waits for its predecessor's last sample, in real time.
 const KEPT_WAIT: Duration = Duration::from_millis(500);
 
-/// What the process needs to know.
+/// The configuration of the process.
 #[derive(Clone, Debug)]
 pub struct SimulatorConfig {
-    /// The world.
+    /// The warehouse of the world.
     pub warehouse: Warehouse,
-    /// Chooses every imperfection.
+    /// The seed of every imperfection.
     pub seed: u64,
-    /// So many things come and go on the edges.
+    /// The number of things that come and go on the edges.
     pub obstacles: u32,
     /// Baud rate of both serial lines.
     pub baud: u32,
-    /// Where the sensor board's port is linked.
+    /// The path of the link to the sensor board's port.
     pub sensor_link: PathBuf,
-    /// Where the steering board's port is linked.
+    /// The path of the link to the steering board's port.
     pub steering_link: PathBuf,
-    /// Whether to go on with the world a killed predecessor left on the bus, if there is one.
+    /// Whether to continue in the world that a killed predecessor has left on the bus, if it has.
     pub resume: bool,
 }
 
@@ -72,10 +72,10 @@ pub enum RunError {
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] PortError),
-    /// The requests of a person's hands cannot be received.
+    /// The process cannot receive requests to change the world.
     #[error(transparent)]
     Hands(#[from] ReceiveError),
-    /// The truth cannot be told.
+    /// The process cannot publish `truth/pose`.
     #[error(transparent)]
     Send(#[from] SendError),
 }
@@ -119,7 +119,7 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
     shell.run(&bus.clock(), shutdown)
 }
 
-/// How much of the robot time that has passed, which took `real`, the world makes up for.
+/// The part of the passed robot time that the world catches up with; `real` is its real time.
 fn made_up(passed: Duration, real: Duration) -> Duration {
     match real > MADE_UP {
         true => passed.mul_f64(MADE_UP.div_duration_f64(real)),
@@ -172,7 +172,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Passes bytes in both directions, after the robot has come up to the present.
+    /// Passes bytes in both directions, after the robot has advanced to the present.
     fn exchange(&mut self) {
         for Line {
             wire,
@@ -193,12 +193,12 @@ impl Shell {
             if dropped > 0 && *lost == 0 && port.is_open() {
                 tracing::warn!(?wire, "nobody reads the port fast enough; bytes are lost");
             }
-            // Told once each time the port is opened.
+            // Logged once each time a program opens the port.
             *lost = if port.is_open() { *lost + dropped } else { 0 };
         }
     }
 
-    /// Does what a person's hands would do.
+    /// Answers the requests to change the world.
     fn obey_hands(&mut self) -> Result<(), ReceiveError> {
         let (robot, warehouse) = (&mut self.robot, &self.warehouse);
         self.hands.serve(|ask| {
@@ -217,8 +217,8 @@ impl Shell {
         self.truth.send(Cause::OWN, message(&self.robot.truth()))
     }
 
-    /// Sleeps for `time`, or until somebody writes to an open port. A closed one cannot be waited
-    /// on: it is always ready, with an error.
+    /// Sleeps for `time`, or until a program writes to an open port. It cannot wait on a closed
+    /// port, which is always ready, with an error.
     fn sleep(&self, time: Duration) {
         let mut fds = Vec::with_capacity(2);
         for line in self.lines.iter().filter(|line| line.port.is_open()) {
@@ -228,7 +228,7 @@ impl Shell {
             tv_sec: time.as_secs() as i64,
             tv_nsec: i64::from(time.subsec_nanos()),
         };
-        // An interrupted sleep is only a shorter one.
+        // A signal only makes the sleep shorter.
         let _ = poll(&mut fds, Some(&time));
     }
 }
@@ -244,7 +244,7 @@ mod tests {
         assert_eq!(made_up(ms(5), ms(5)), ms(5));
         assert_eq!(made_up(ms(50), ms(50)), ms(50));
         assert_eq!(made_up(ms(3_000), ms(3_000)), ms(50));
-        // A clock that runs twenty times as fast.
+        // For a clock that runs twenty times as fast.
         assert_eq!(made_up(ms(600), ms(30)), ms(600));
         assert_eq!(made_up(ms(60_000), ms(3_000)), ms(1_000));
     }

@@ -1,13 +1,12 @@
-//! The world as a sample of `truth/pose`, and back.
+//! The simulated world as a sample of `truth/pose`, and the world back from a sample.
 
 use core::time::Duration;
 
-use lager_plant::{Edge, Good, GoodState, Pose, Standing, WorldState};
+use lager_floor::{Edge, Node};
+use lager_plant::{Good, GoodState, Pose, Snapshot, Standing, WorldState};
 use lager_topics as topics;
 
-use crate::robot::Snapshot;
-
-/// The sample that tells the truth.
+/// The sample for the true state `truth`.
 pub fn message(truth: &Snapshot) -> topics::Truth {
     let world = &truth.world;
     let mut message = topics::Truth {
@@ -42,15 +41,11 @@ pub fn message(truth: &Snapshot) -> topics::Truth {
         };
     }
     for (place, stands) in message.obstacles.iter_mut().zip(&world.obstacles) {
-        let [x, y] = stands.edge.from;
+        let Node { x, y } = stands.edge.from;
         *place = topics::TruthObstacle {
             x,
             y,
-            heading: match stands.edge.to[0] > x {
-                true => topics::Heading::Right,
-                false => topics::Heading::Up,
-            }
-            .into(),
+            heading: stands.edge.heading().into(),
             by_chance: stands.by_chance.into(),
         };
     }
@@ -59,8 +54,8 @@ pub fn message(truth: &Snapshot) -> topics::Truth {
     message
 }
 
-/// The world a sample tells of. Goods in a state this build does not know are left out, and so
-/// stay where the warehouse has them.
+/// The world in a sample. Goods in a state that this build does not know are left out, so they stay
+/// where the warehouse has them.
 pub fn world_state(message: &topics::Truth) -> WorldState {
     let goods = message.goods().iter().filter_map(|good| {
         Some(Good {
@@ -75,14 +70,8 @@ pub fn world_state(message: &topics::Truth) -> WorldState {
         })
     });
     let obstacles = message.obstacles().iter().filter_map(|stands| {
-        let from = [stands.x, stands.y];
-        let to = match stands.heading.get()? {
-            topics::Heading::Right => [stands.x.checked_add(1)?, stands.y],
-            topics::Heading::Up => [stands.x, stands.y.checked_add(1)?],
-            _ => return None,
-        };
         Some(Standing {
-            edge: Edge { from, to },
+            edge: Edge::leaving(Node::new(stands.x, stands.y), stands.heading.get()?)?,
             by_chance: stands.by_chance != 0,
         })
     });
@@ -104,6 +93,8 @@ pub fn world_state(message: &topics::Truth) -> WorldState {
 
 #[cfg(test)]
 mod tests {
+    use lager_floor::Heading;
+
     use super::*;
 
     #[test]
@@ -132,17 +123,11 @@ mod tests {
             collisions: 3,
             obstacles: vec![
                 Standing {
-                    edge: Edge {
-                        from: [1, 2],
-                        to: [2, 2],
-                    },
+                    edge: Edge::of(Node::new(1, 2), Heading::Down),
                     by_chance: true,
                 },
                 Standing {
-                    edge: Edge {
-                        from: [0, 0],
-                        to: [0, 1],
-                    },
+                    edge: Edge::of(Node::new(0, 0), Heading::Left),
                     by_chance: false,
                 },
             ],

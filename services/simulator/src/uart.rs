@@ -1,19 +1,19 @@
-//! One serial line between a board and the Pi, both directions, at the baud rate.
+//! One serial line between a board and the Pi, in both directions, at the baud rate.
 //!
 //! ```text
 //!   Pi --write--> [byte, arrives at t] [..] --> board     every byte takes 10 bits (8N1)
 //!   Pi <--read--- [byte, arrives at t] [..] <-- board     queued whole or not at all
 //! ```
-//! A byte exists for a board from the moment its last bit is over. The Pi's UART hands on what it
-//! has when the line falls idle, so the Pi gets what was queued in one piece in one piece. Nothing
-//! waits for a reader: what the Pi does not fetch in time is lost, as on a real port nobody has
-//! open.
+//! A board gets a byte at the end of the byte's last bit. The Pi's UART passes its bytes on when
+//! the line falls idle, so bytes that a board queued in one piece reach the Pi in one piece.
+//! Nothing waits for a reader: bytes that the Pi does not read in time are lost, as on a real port
+//! that nobody has opened.
 
 use std::collections::VecDeque;
 
-/// Bytes the board can queue for sending.
+/// The number of bytes that the board can queue.
 const BOARD_QUEUE: u64 = 64;
-/// Bytes that have arrived at the Pi and wait to be fetched.
+/// The number of arrived bytes that the Pi's side keeps until they are read.
 const PI_BUFFER: usize = 4_096;
 
 /// A serial line.
@@ -24,13 +24,13 @@ pub(crate) struct Uart {
     to_board_free_ns: u64,
     to_pi: VecDeque<(u64, u8)>,
     to_pi_free_ns: u64,
-    /// What was queued in one piece and has not wholly arrived.
+    /// The pieces that have not wholly arrived; the board queued each at once.
     pieces: VecDeque<Piece>,
     cut: bool,
     dropped: u64,
 }
 
-/// When the bits of what a board queued at once go over the line.
+/// The time during which the bits of one piece are on the line.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     begin_ns: u64,
@@ -51,7 +51,7 @@ impl Uart {
         }
     }
 
-    /// The Pi sends.
+    /// Bytes that the Pi sends.
     pub(crate) fn write(&mut self, now: u64, bytes: &[u8]) {
         for &byte in bytes {
             self.to_board_free_ns = self.to_board_free_ns.max(now) + self.byte_ns;
@@ -63,7 +63,7 @@ impl Uart {
         }
     }
 
-    /// The Pi fetches what has arrived, but nothing yet of a piece that is still arriving.
+    /// The Pi reads what has arrived, except for a piece that is still arriving.
     pub(crate) fn read(&mut self, now: u64, into: &mut Vec<u8>) {
         let until = self
             .next_piece(now)
@@ -96,7 +96,7 @@ impl Uart {
         true
     }
 
-    /// Bytes on the way to the Pi that no board sent: noise on the cable.
+    /// Adds bytes on the way to the Pi that no board sent: noise on the cable.
     pub(crate) fn disturb_pi(&mut self, now: u64, bytes: &[u8]) {
         for &byte in bytes {
             let place = self.to_pi.partition_point(|(at, _)| *at <= now);
@@ -106,7 +106,7 @@ impl Uart {
         }
     }
 
-    /// The board's oldest byte that has arrived.
+    /// The oldest byte that has arrived at the board.
     pub(crate) fn receive(&mut self, now: u64) -> Option<u8> {
         let &(at, byte) = self.to_board.front()?;
         (at <= now).then(|| {
@@ -115,25 +115,25 @@ impl Uart {
         })
     }
 
-    /// Whether everything queued has left the board.
+    /// Whether all queued bytes have left the board.
     pub(crate) fn is_idle(&self, now: u64) -> bool {
         self.to_pi_free_ns <= now
     }
 
-    /// The next instant after `now` at which the board notices something: a byte, or the end of
-    /// its sending.
+    /// The next time after `now` at which the board notices something: a byte, or the end of its
+    /// transmission.
     pub(crate) fn next_event(&self, now: u64) -> u64 {
         let byte = self.to_board.iter().map(|(at, _)| *at).find(|at| *at > now);
         let sent = (self.to_pi_free_ns > now).then_some(self.to_pi_free_ns);
         byte.unwrap_or(u64::MAX).min(sent.unwrap_or(u64::MAX))
     }
 
-    /// When the next piece will have wholly arrived at the Pi.
+    /// The time when the next piece will have wholly arrived at the Pi.
     pub(crate) fn next_end(&mut self, now: u64) -> Option<u64> {
         self.next_piece(now).map(|piece| piece.end_ns)
     }
 
-    /// The next piece that has not wholly arrived at the Pi; those that have are forgotten.
+    /// The next piece that has not wholly arrived at the Pi; removes those that have.
     fn next_piece(&mut self, now: u64) -> Option<Piece> {
         while self.pieces.front().is_some_and(|piece| piece.end_ns <= now) {
             self.pieces.pop_front();
@@ -141,7 +141,7 @@ impl Uart {
         self.pieces.front().copied()
     }
 
-    /// The board starts anew: what it had queued and what was sent to it until now is gone.
+    /// The board starts again: its queue, and all bytes sent to it until now, are lost.
     pub(crate) fn restart_board(&mut self, now: u64) {
         let byte_ns = self.byte_ns;
         self.to_board.retain(|(at, _)| *at > now);
@@ -151,7 +151,7 @@ impl Uart {
         self.pieces.clear();
     }
 
-    /// Cuts the cable or mends it; what is under way when it is cut is lost.
+    /// Cuts or mends the cable; bytes on their way at a cut are lost.
     pub(crate) fn set_cut(&mut self, cut: bool, now: u64) {
         self.cut = cut;
         if cut {
@@ -160,7 +160,7 @@ impl Uart {
         }
     }
 
-    /// Bytes lost on the way for want of a reader, of room or of a cable.
+    /// The number of bytes lost because a reader, room or the cable was missing.
     pub(crate) fn dropped(&self) -> u64 {
         self.dropped
     }

@@ -1,23 +1,24 @@
-//! The simulator as a process would run it: real ptys, a real bus, real time.
+//! Tests of the simulator as a process runs it: real ptys, a real bus, real time.
 
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lager_plant::Warehouse;
-use lager_ports::{Bus, BusConfig, Shutdown};
+use lager_ports::{Bus, BusConfig};
 use lager_rig::{Domain, Host};
 use lager_simulator::{RunError, SimulatorConfig};
 use lager_topics::{Role, TruthPose};
+use lager_wake::Shutdown;
 use lager_wire::{Callsign, Command, Payload, ResetCause, SteerCommand, WheelCommand};
 
-/// What must happen happens before this, or the test fails instead of hanging.
+/// The longest wait for any condition; after it a test fails instead of hanging.
 const WATCHDOG: Duration = Duration::from_secs(60);
 
-/// A bus and a folder of the test's own.
-struct Place(Domain);
+/// A bus and a folder that only one test uses.
+struct OwnBus(Domain);
 
-impl Place {
+impl OwnBus {
     fn new() -> Self {
         Self(Domain::new("lager-sim").unwrap())
     }
@@ -53,10 +54,10 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for OwnBus {
     fn drop(&mut self) {
-        let left = self.0.place().segments();
-        // The transport keeps one small segment for each bus for ever.
+        let left = self.0.home().segments();
+        // The transport never removes one small segment of each bus.
         let is_left = |path: &PathBuf| path.extension().is_none_or(|end| end != "global_mgmt");
         if !std::thread::panicking() {
             assert!(!left.iter().any(is_left), "{left:?}");
@@ -95,7 +96,7 @@ fn until(what: &str, mut done: impl FnMut() -> bool) {
 
 #[test]
 fn a_robot_is_driven_through_its_ports_and_goes_on_after_a_restart() {
-    let place = Place::new();
+    let place = OwnBus::new();
     let observer = place.open(Role::Supervisor);
     let mut keeper = observer.keeper::<TruthPose>().unwrap();
     let mut truth = observer.subscriber::<TruthPose>().unwrap();
@@ -140,7 +141,7 @@ fn a_robot_is_driven_through_its_ports_and_goes_on_after_a_restart() {
 
     let simulator = place.start(true);
     until("the second's port", || {
-        // As the supervisor does on its tick: a late joiner gets the kept value from here.
+        // The supervisor does this on its tick, so that a new process gets the kept sample.
         keeper.remember().unwrap();
         config.steering_link.exists()
     });
@@ -173,7 +174,7 @@ fn a_robot_is_driven_through_its_ports_and_goes_on_after_a_restart() {
 
 #[test]
 fn a_port_that_cannot_be_made_is_said_in_a_sentence() {
-    let place = Place::new();
+    let place = OwnBus::new();
     std::fs::write(place.0.files().join("sensor"), "not a link").unwrap();
     let simulator = place.start(false);
     let refused = simulator.thread.join().unwrap().unwrap_err();

@@ -1,5 +1,5 @@
-//! What other threads wait for: answers of robots, what robots say unasked, and what the disk
-//! takes.
+//! Other threads wait here for the answers of robots, for the news that robots tell, and for the
+//! disk to save a change.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
@@ -9,12 +9,13 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
 
 use lager_lines::{Name, Text};
+use lager_orders::{Code, Reason};
 
-use crate::shown::{Reply, Told};
-use crate::station::{News, Uses};
+use crate::shown::{Reply, Saying};
+use crate::station::{RobotSaid, Uses};
 
-/// What a robot tells of earlier is what it told then, if that was so near to it: it is counted from
-/// when each was read.
+/// A robot may tell an event a second time, with the time when it happened. If the two times differ
+/// by less than this, the station takes both for the same event.
 const SAME: Duration = Duration::from_secs(5);
 
 /// The answer to an action or to a stop, which comes later.
@@ -24,76 +25,75 @@ pub struct Awaited {
 }
 
 impl Awaited {
-    /// The answer, once; `None` if it does not come in this time, or has been taken.
+    /// Waits for the answer, at most for this time. Returns it once. `None` if it has not come, or
+    /// has been returned before.
     pub fn wait(&self, timeout: Duration) -> Option<Reply> {
         self.reply.recv_timeout(timeout).ok()
     }
 }
 
-/// Whether a warehouse has been saved, which comes later.
+/// Tells later whether a warehouse was saved.
 #[derive(Debug)]
 pub struct Saving {
-    saved: Receiver<Result<(), String>>,
+    saved: Receiver<Result<(), Reason>>,
     kept_in: Option<PathBuf>,
     robots: Vec<Uses>,
 }
 
 /// The other end.
-pub(crate) type Saved = SyncSender<Result<(), String>>;
+pub(crate) type Saved = SyncSender<Result<(), Reason>>;
 
 impl Saving {
-    /// That it is saved, or why not, once; `None` if that is not known in this time, or has been
-    /// taken. A station without a file has nothing to save, and is done.
-    pub fn wait(&self, timeout: Duration) -> Option<Result<(), String>> {
+    /// Whether the warehouse is saved, or why not. Returned once; `None` if nobody knows it in this
+    /// time. A station without a file has nothing to save and answers at once.
+    pub fn wait(&self, timeout: Duration) -> Option<Result<(), Reason>> {
         self.saved.recv_timeout(timeout).ok()
     }
 
-    /// Where it is kept once it is saved, and what robots do with it, in a sentence.
-    pub fn sentence(&self) -> String {
-        let mut sentence = match &self.kept_in {
-            Some(path) => format!("saved in {}", path.display()),
-            None => "taken, and lost when the station ends".to_owned(),
+    /// Where the warehouse is kept once it is saved, and what each robot does with it.
+    pub fn told(&self) -> impl Iterator<Item = Reason> {
+        let kept = match &self.kept_in {
+            Some(path) => Reason::new(Code::SavedIn, &[&path.display()]),
+            None => Code::SavedNowhere.into(),
         };
-        for uses in &self.robots {
-            sentence.push_str(&format!("; {uses}"));
-        }
-        sentence
+        std::iter::once(kept).chain(self.robots.iter().map(Reason::from))
     }
 }
 
-/// What robots say: events and thoughts, in their order.
+/// The events and thoughts that robots tell, in their order.
 #[derive(Debug)]
 pub struct Subscription {
-    news: Receiver<News>,
+    news: Receiver<RobotSaid>,
     lost: Arc<AtomicU64>,
 }
 
 impl Subscription {
-    /// What may wait to be taken; what comes then is lost, and counted.
+    /// How many may wait here. When so many wait, a new one is lost and counted.
     pub const MOST: usize = 1024;
 
-    /// What is kept of what was said, for [`Handle::recall`](crate::Handle::recall).
+    /// How many the station keeps for [`Handle::recall`](crate::Handle::recall).
     pub const KEPT: usize = 1024;
 
-    /// The next one; `None` if there is none in this time, or the station has ended.
-    pub fn next(&self, timeout: Duration) -> Option<News> {
+    /// Waits for the next one, at most for this time. `None` if none has come, or the station has
+    /// ended.
+    pub fn next(&self, timeout: Duration) -> Option<RobotSaid> {
         self.news.recv_timeout(timeout).ok()
     }
 
-    /// How many were lost since nobody took them.
+    /// How many were lost because nobody took them in time.
     pub fn lost(&self) -> u64 {
         self.lost.load(Ordering::Relaxed)
     }
 }
 
-/// The other ends of all of these.
+/// The station's ends of all of these.
 #[derive(Debug, Default)]
 pub(crate) struct Outlets {
     replies: BTreeMap<(Name, u32), SyncSender<Reply>>,
-    subscribers: Vec<(SyncSender<News>, Arc<AtomicU64>)>,
+    subscribers: Vec<(SyncSender<RobotSaid>, Arc<AtomicU64>)>,
     savings: Vec<Saved>,
-    /// What was said last.
-    kept: VecDeque<News>,
+    /// The last events and thoughts.
+    kept: VecDeque<RobotSaid>,
 }
 
 impl Outlets {
@@ -115,12 +115,12 @@ impl Outlets {
         }
     }
 
-    /// Who waits for that; it is then no longer here.
+    /// Takes out those who wait for the warehouse.
     pub(crate) fn savings(&mut self) -> Vec<Saved> {
         core::mem::take(&mut self.savings)
     }
 
-    /// What is said from now on, and before it what is kept, if `recalls`.
+    /// Subscribes to what robots tell from now on. With `recalls`, the kept news come first.
     pub(crate) fn subscribe(&mut self, recalls: bool) -> Subscription {
         let before = if recalls { self.kept.len() } else { 0 };
         let (to, news) = sync_channel(Subscription::MOST + before);
@@ -133,35 +133,36 @@ impl Outlets {
         Subscription { news, lost }
     }
 
-    /// What a robot has told of earlier, as news of when it was; nothing if it was told then, too.
-    fn recalled(&self, news: News) -> Vec<News> {
-        let News { robot, at, told } = news;
-        let Told::Past { ago, told } = told else {
-            return vec![News { robot, at, told }];
+    /// Turns an event that a robot tells late into news of the time when it happened. `None` if the
+    /// robot told it at that time, too.
+    fn recalled(&self, news: RobotSaid) -> Vec<RobotSaid> {
+        let RobotSaid { robot, at, told } = news;
+        let Saying::Past { ago, told } = told else {
+            return vec![RobotSaid { robot, at, told }];
         };
         let at = at.saturating_sub(ago);
-        let is_it = |other: &News| {
+        let is_it = |other: &RobotSaid| {
             let is_near = other.at.abs_diff(at) < SAME;
             is_near && other.robot == robot && other.told == *told
         };
         if self.kept.iter().any(is_it) {
             return Vec::new();
         }
-        let mut news = vec![News {
+        let mut news = vec![RobotSaid {
             robot: robot.clone(),
             at,
             told: *told,
         }];
-        // Its words are not told again, and its values say it all.
-        if matches!(news[0].told, Told::Thinks(_)) {
-            let told = Told::Thought(Text::default());
-            news.push(News { robot, at, told });
+        // The robot does not repeat the sentence. The values say the same.
+        if matches!(news[0].told, Saying::Thinks(_)) {
+            let told = Saying::Thought(Text::default());
+            news.push(RobotSaid { robot, at, told });
         }
         news
     }
 
-    /// Keeps what was said, by when it was.
-    fn keep(&mut self, news: News) {
+    /// Keeps an event, sorted by the time when it happened.
+    fn keep(&mut self, news: RobotSaid) {
         let later = self.kept.iter().rev();
         let later = later.take_while(|other| other.at > news.at).count();
         self.kept.insert(self.kept.len() - later, news);
@@ -170,23 +171,23 @@ impl Outlets {
         }
     }
 
-    /// Forgets who takes no news any more; each would keep the memory of his queue until then.
+    /// Forgets subscribers that have gone; their queues would keep their memory.
     pub(crate) fn forget_gone(&mut self) {
-        // What he counts with is shared by both ends.
+        // Both ends share the counter.
         self.subscribers
             .retain(|(_, lost)| Arc::strong_count(lost) > 1);
     }
 
-    /// Hands on what robots have said. It waits for nobody.
-    pub(crate) fn hand_on(&mut self, news: Vec<News>) {
+    /// Hands on what robots have told. It waits for nobody.
+    pub(crate) fn hand_on(&mut self, news: Vec<RobotSaid>) {
         for news in news
             .into_iter()
             .flat_map(|news| self.recalled(news))
             .collect::<Vec<_>>()
         {
-            if let Told::Replied { number, reply } = news.told {
+            if let Saying::Replied { number, reply } = news.told {
                 if let Some(to) = self.replies.remove(&(news.robot, number)) {
-                    // Whoever has asked may have given up.
+                    // The thread that asked may have given up.
                     let _ = to.try_send(reply);
                 }
                 continue;

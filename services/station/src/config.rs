@@ -1,16 +1,19 @@
-//! Where a station listens and what it is told, and why there is none.
+//! The configuration of a station, and the reasons why one cannot start.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 
+use lager_floor::ProductId;
 use lager_lines::secret::Secrets;
-use lager_lines::{Called, Name, ProductId, UnknownProduct};
+use lager_lines::{Called, Name, UnknownProduct};
+use lager_orders::Reason;
+use lager_plant::Warehouse;
 use thiserror::Error;
 
 use crate::files::{HeldBy, ReadError};
 use crate::station::WishRefused;
-use crate::warehouse::{LoadError, Warehouse, WarehouseError};
+use crate::warehouse::LoadError;
 
 /// Where a station listens and what it knows.
 #[derive(Debug)]
@@ -19,28 +22,29 @@ pub struct ServerConfig {
     pub name: Name,
     /// Where robots connect.
     pub listen: Listen,
-    /// By what robots prove who they are; where there are none they are taken at their word.
+    /// The secrets by which robots prove their names. Without secrets the station believes every
+    /// robot.
     pub secrets: Secrets,
     /// Where a GaG connects, if one may.
     pub gag: Option<PathBuf>,
     /// The file of the warehouse, in which changes are saved. It need not be there yet.
     pub warehouse: Option<PathBuf>,
-    /// The warehouse as long as it has no file. Without it a GaG or another user of the station
-    /// describes the warehouse.
+    /// The warehouse to use while there is no file. Without it a GaG or a person describes the
+    /// warehouse.
     pub otherwise: Option<Warehouse>,
     /// The file of the robots' queues.
     pub queues: Option<PathBuf>,
-    /// What robots are to fetch after what waits for them already. A name needs the warehouse's
-    /// file.
+    /// The products that robots fetch after those that wait already. A product's name needs the
+    /// warehouse's file.
     pub fetch: Vec<(Name, Called)>,
 }
 
 /// Where robots connect.
 #[derive(Debug)]
 pub enum Listen {
-    /// At an address; port 0 is one that is free.
+    /// At an address. Port 0 takes any free port.
     At(SocketAddr),
-    /// At a socket that listens already.
+    /// At a socket that somebody else has opened.
     On(TcpListener),
 }
 
@@ -69,19 +73,19 @@ pub enum ServerError {
         /// Where.
         path: PathBuf,
     },
-    /// The warehouse's file is none.
+    /// The warehouse's file holds something else.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The queues' file is not read.
+    /// Nobody can read the queues' file.
     #[error(transparent)]
     Queues(#[from] ReadError),
     /// Another station saves in that file.
     #[error(transparent)]
     Held(#[from] HeldBy),
-    /// There can be no such warehouse.
+    /// Such a warehouse cannot exist.
     #[error(transparent)]
-    Warehouse(#[from] WarehouseError),
-    /// Nothing is called so.
+    Warehouse(#[from] Reason),
+    /// No product has this name.
     #[error("robot {robot} is not told to fetch {}: {why}", .why.called)]
     Called {
         /// Which.
@@ -99,7 +103,7 @@ pub enum ServerError {
         /// Why not.
         why: WishRefused,
     },
-    /// The machine does not let it wait.
+    /// The system does not let the station wait for its sockets.
     #[error("the station cannot go on: {0}")]
     Machine(#[from] io::Error),
 }

@@ -1,7 +1,8 @@
 //! One connection: bytes to lines and lines to bytes, without ever waiting for its peer.
 //!
-//! The memory for a peer is bounded: one line that it has not ended, and [`MOST_UNREAD`] bytes that
-//! it has not read. A connection that is slower than that is closed, see [`Connection::overdue`].
+//! The memory for a peer has a limit: one line that the peer has not ended, and [`MOST_UNREAD`]
+//! bytes that it has not read. The station closes a connection that is slower
+//! ([`Connection::overdue`]).
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -21,8 +22,8 @@ const MOST_UNREAD: usize = 64 * 1024;
 /// waits for it.
 const SLOWEST: Duration = Duration::from_secs(5);
 
-/// Bytes that are read at a time. What a peer sends beyond them waits for its next turn, so that
-/// one that never ends keeps nobody else waiting.
+/// Bytes that the station reads at a time. If a peer sends more, the rest waits for the next turn,
+/// so a peer that never ends does not delay the others.
 const READ: usize = 4096;
 
 /// A stream of either kind.
@@ -63,16 +64,16 @@ pub(crate) struct Connection {
     stream: Stream,
     splitter: LineSplitter,
     unread: Vec<u8>,
-    /// Whether the peer takes nothing any more. What it has said before it went is still read, up
-    /// to the end of the connection.
+    /// Whether the peer has stopped reading. The station still reads what the peer sent before the
+    /// connection ends.
     is_deaf: bool,
-    /// Whether the peer has read a part of the first line of that.
+    /// Whether the peer has read a part of the first line that waits.
     is_begun: bool,
-    /// Since when there is something the peer has not read.
+    /// Since when a line waits that the peer has not read.
     unread_since: Instant,
-    /// Since when a line is begun and not ended.
+    /// Since when the peer has begun a line without ending it.
     begun_since: Option<Instant>,
-    /// For how long what is read now may have waited, since this process was held up.
+    /// How long the next bytes may have waited because this process was held up.
     late: Duration,
 }
 
@@ -91,34 +92,34 @@ impl Connection {
         }
     }
 
-    /// This process was held up for so long, and what waits now may have come meanwhile.
+    /// Tells how long this process was held up; bytes that wait now may have come meanwhile.
     pub(crate) fn held_up(&mut self, pause: Duration) {
         if self.waits() {
             self.late = self.late.max(pause);
         }
     }
 
-    /// Whether something waits to be read here.
+    /// Whether bytes wait to be read here.
     fn waits(&self) -> bool {
         ioctl_fionread(&self.stream).is_ok_and(|waits| waits > 0)
     }
 
-    /// For how long what is read next may have waited at most.
+    /// How long the bytes that are read next may have waited, at most.
     pub(crate) const fn late(&self) -> Duration {
         self.late
     }
 
-    /// Whether the peer, of a unix socket, has read all that it was told.
+    /// Whether the peer of a unix socket has read every line.
     pub(crate) fn has_read_all(&self) -> bool {
         self.unread.is_empty() && !is_unread(&self.stream)
     }
 
-    /// Whether something waits to be written.
+    /// Whether lines wait to be written.
     pub(crate) fn wants_to_write(&self) -> bool {
         !self.unread.is_empty()
     }
 
-    /// Takes what has arrived and hands on each line.
+    /// Reads the bytes that have arrived and hands on each line.
     ///
     /// # Errors
     ///
@@ -156,7 +157,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Says a line, as far as the peer takes it at once; the rest waits.
+    /// Writes a line, as much as the peer takes at once; the rest waits.
     ///
     /// # Errors
     ///
@@ -165,7 +166,7 @@ impl Connection {
         self.put(now, self.unread.len(), line)
     }
 
-    /// Says a line before all that wait, but for one that the peer has begun to read.
+    /// Writes a line before all lines that wait, except one that the peer has begun to read.
     ///
     /// # Errors
     ///
@@ -191,8 +192,8 @@ impl Connection {
         Ok(())
     }
 
-    /// Writes what waits, as far as the peer takes it. That it has gone, [`Connection::read`] finds
-    /// behind what it has said.
+    /// Writes the lines that wait, as much as the peer takes. If the peer has gone,
+    /// [`Connection::read`] finds that out, after the peer's last line.
     pub(crate) fn write(&mut self, now: Instant) {
         while !self.unread.is_empty() {
             match self.stream.write(&self.unread) {
@@ -211,10 +212,10 @@ impl Connection {
         }
     }
 
-    /// Why it is closed now, if its peer has taken too long over something.
+    /// Why the station closes the connection now, if the peer was too slow.
     pub(crate) fn overdue(&self, now: Instant) -> Option<&'static str> {
         let over = |since: Instant, most| now.saturating_duration_since(since) > most;
-        // One that takes nothing more may send on, but not for ever.
+        // A peer that has stopped reading may go on sending, but not for ever.
         if (self.is_deaf || self.wants_to_write()) && over(self.unread_since, SLOWEST) {
             return Some("it does not read what it is told");
         }

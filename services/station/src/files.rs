@@ -2,10 +2,10 @@
 //! one process at a time.
 //!
 //! A path may name anything: a pipe that nobody writes to, a device that never ends, a symbolic
-//! link, a file of somebody else's format. None of them may hang a process that drives a robot,
-//! and saving changes what a file contains and nothing else about it.
+//! link, or a file of another format. None of them may hang a process that drives a robot. Saving a
+//! file changes only its content, and not its mode or owner.
 //!
-//! It knows no format: what a text means is its caller's.
+//! This module knows no format. The caller knows the format.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -21,10 +21,10 @@ use thiserror::Error;
 /// The longest text that is read, in bytes.
 pub const MOST_BYTES: u64 = 1 << 20;
 
-/// Symbolic links behind each other, at most, as the kernel has it.
+/// How many symbolic links may follow each other; the kernel allows as many.
 const MOST_LINKS: usize = 40;
 
-/// Why a file is not read.
+/// Why a file could not be read.
 #[derive(Debug, Error)]
 pub enum ReadError {
     /// It could not be read.
@@ -35,7 +35,7 @@ pub enum ReadError {
         /// Why.
         error: io::Error,
     },
-    /// It is not what it should be.
+    /// The file has not the right content.
     #[error("{}: {}", .path.display(), in_words(.error))]
     Toml {
         /// The file.
@@ -46,7 +46,7 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// Whether the file is there and holds something else, so that it never will be read.
+    /// Whether the file exists with other content, so that a second attempt fails as well.
     pub fn is_damage(&self) -> bool {
         match self {
             Self::Toml { .. } => true,
@@ -58,7 +58,7 @@ impl ReadError {
     }
 }
 
-/// What is wrong with a text of TOML, and what was meant if a key or a value is mistyped.
+/// Says what is wrong with a text of TOML, and suggests the right word for a mistyped key or value.
 fn in_words(error: &toml::de::Error) -> String {
     let hint = lager_lines::hint(error.message());
     format!("{}{hint}", error.to_string().trim_end())
@@ -67,9 +67,9 @@ fn in_words(error: &toml::de::Error) -> String {
 /// Reads a text from a regular file.
 ///
 /// # Errors
-/// It cannot be read, is no regular file, is longer than [`MOST_BYTES`], or is no text.
+/// The file cannot be read, is not a regular file, is longer than [`MOST_BYTES`], or is not text.
 pub fn read(path: &Path) -> io::Result<String> {
-    // Asked first, because opening a device may already do something.
+    // This check comes before the file is opened: to open a device may already have an effect.
     refuse_others(&fs::metadata(path)?)?;
     let file = OpenOptions::new()
         .read(true)
@@ -87,7 +87,7 @@ pub fn read(path: &Path) -> io::Result<String> {
 /// Reads a value from a file of TOML.
 ///
 /// # Errors
-/// As [`read`], or the file holds something else.
+/// As [`read`], or the file does not hold such a value.
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ReadError> {
     let at = || path.to_owned();
     let text = read(path).map_err(|error| ReadError::Read { path: at(), error })?;
@@ -97,7 +97,7 @@ pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ReadError> {
 /// Reads a value from a text of TOML that came from `path`.
 ///
 /// # Errors
-/// It is something else.
+/// The text does not hold such a value.
 pub fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ReadError> {
     toml::from_str(text).map_err(|error| ReadError::Toml {
         path: path.to_owned(),
@@ -117,18 +117,18 @@ fn invalid(why: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, why)
 }
 
-/// Replaces what a file contains, so that whoever reads it, even after a loss of power, finds the
-/// text before or this one and nothing between: a new file beside it is written and synchronised,
-/// takes its name, and the folder is synchronised. Where the path is a symbolic link, the file that
-/// it leads to is replaced. Mode and owner of the file stay, as far as this process may.
+/// Replaces the content of a file. Even after a loss of power, a reader finds either the old text
+/// or the new one, never a mixture. A new file is written beside the old one, synchronised, and
+/// then takes its name. If the path is a symbolic link, the file at its end is replaced. The file
+/// keeps its mode and its owner, as far as this process may set them.
 ///
-/// One process does it at a time ([`Hold`]). If it is killed half way, the file beside stays, named
-/// `NAME.new`, and is replaced by the next one.
+/// Only one process may do this at a time ([`Hold`]). If it is killed half way, the new file stays
+/// as `NAME.new`, and the next process overwrites it.
 ///
 /// # Errors
-/// The disk does not take it, or there is something else than a regular file. The file is as it
-/// was; if only its folder could not be synchronised it is the new one, which a loss of power may
-/// undo.
+/// The disk refuses the new file, or the path is not a regular file. The old text stays. If only
+/// the folder could not be synchronised, the new text stands there, but a loss of power may bring
+/// the old one back.
 pub fn replace(path: &Path, text: &str) -> io::Result<()> {
     let target = behind_links(path)?;
     let before = match fs::symlink_metadata(&target) {
@@ -142,18 +142,19 @@ pub fn replace(path: &Path, text: &str) -> io::Result<()> {
     let beside = beside(&target, "new");
     let replaced = put(&target, &beside, text, before.as_ref());
     if replaced.is_err() {
-        // What could not be finished is of no use, and its name is free again.
+        // A half-written file is useless, and its name must be free for the next attempt.
         let _ = fs::remove_file(&beside);
     }
     replaced
 }
 
 fn put(target: &Path, beside: &Path, text: &str, before: Option<&fs::Metadata>) -> io::Result<()> {
-    // One that was left, or a link to elsewhere, is not written to.
+    // The path may be an old file, or a link to elsewhere: never write into that.
     let _ = fs::remove_file(beside);
     let mut file = File::create_new(beside)?;
     if let Some(before) = before {
-        // Only the superuser may; for all others it is theirs already.
+        // Only the superuser may give a file to another user; for others the owner is already
+        // right.
         let _ = fchown(&file, Some(before.uid()), Some(before.gid()));
         file.set_permissions(before.permissions())?;
     }
@@ -166,7 +167,7 @@ fn put(target: &Path, beside: &Path, text: &str, before: Option<&fs::Metadata>) 
     File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }
 
-/// Where a path leads, which need not be there yet.
+/// Where a path leads. The file at its end need not exist yet.
 fn behind_links(path: &Path) -> io::Result<PathBuf> {
     let mut at = path.to_owned();
     for _ in 0..MOST_LINKS {
@@ -177,7 +178,7 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
                     None => to,
                 }
             }
-            // It is none, or nothing.
+            // It is not a link, or there is nothing.
             Err(error)
                 if matches!(
                     error.kind(),
@@ -200,8 +201,8 @@ pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-/// Moves a file that cannot be read out of the way, to `NAME.damaged-TIME` in seconds since 1970;
-/// returns where it is.
+/// Moves a damaged file out of the way, to `NAME.damaged-TIME` with the time in seconds since 1970.
+/// Returns the new path.
 ///
 /// # Errors
 /// It cannot be moved.
@@ -213,7 +214,7 @@ pub fn set_aside(path: &Path) -> io::Result<PathBuf> {
     Ok(aside)
 }
 
-/// Why a file is not held.
+/// Why this process could not get a file for itself.
 #[derive(Debug, Error)]
 #[error(
     "{} is kept by process {pid}, and two would overwrite each other's changes; end that one, or \
@@ -223,25 +224,24 @@ pub fn set_aside(path: &Path) -> io::Result<PathBuf> {
 pub struct HeldBy {
     /// The file.
     pub path: PathBuf,
-    /// Who holds it, as it says itself; 0 if it does not.
+    /// The process that holds it, as it says itself; 0 if it does not say.
     pub pid: u32,
 }
 
-/// A file is this process's to replace until this is dropped or the process ends, however it does.
-/// Everybody may read it.
+/// Only this process may replace the file, until this value is dropped or the process ends in any
+/// way. Every process may read it.
 ///
-/// The lock is one on `NAME.lock` beside the file, because the file itself is another one after
-/// each change.
+/// The lock is on `NAME.lock` beside the file, because each change makes a new file.
 #[derive(Debug)]
 pub struct Hold {
     lock: PathBuf,
-    /// Locked as long as it is open.
+    /// Locked while it is open.
     _file: File,
 }
 
 impl Hold {
-    /// Holds the file at `path`, which need not be there. `None` where no lock can be made: there
-    /// nobody can replace the file either.
+    /// Holds the file at `path`, which need not exist yet. `None` where no lock can be made: nobody
+    /// can replace a file there either.
     ///
     /// # Errors
     /// Another process holds it.
@@ -269,7 +269,8 @@ impl Hold {
                 }
                 Err(TryLockError::Error(_)) => return Ok(None),
             }
-            // Whoever held it before may have removed it between the two calls.
+            // The process that held the file before may have removed the lock between the two
+            // calls.
             let is_it = |there: fs::Metadata, own: fs::Metadata| {
                 (there.dev(), there.ino()) == (own.dev(), own.ino())
             };
@@ -286,7 +287,7 @@ impl Hold {
 
 impl Drop for Hold {
     fn drop(&mut self) {
-        // It is still locked, so nobody else believes in it.
+        // It is still locked, so nobody else can have taken it.
         let _ = fs::remove_file(&self.lock);
     }
 }

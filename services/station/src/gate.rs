@@ -1,12 +1,12 @@
-//! What a robot's connection may say before the station hears it: where the station knows secrets,
-//! nobody passes for a robot by its name alone. Pure: lines in, verdicts out.
+//! The gate in front of the station. If the station has secrets, a robot must prove its name before
+//! the station listens to it. Pure: lines in, verdicts out.
 //!
 //! ```text
 //!   fresh ── lager 1 r1 ──> asked ── proof, right ──> open
 //!     │                       └───── anything else ──> refused
 //!     └── a line of the document ──> plain: a robot without a name, which may not take one later
 //! ```
-//! A station without secrets leaves the gate open, and takes robots at their word.
+//! A station without secrets leaves the gate open and believes every robot.
 
 use std::io;
 
@@ -17,32 +17,32 @@ use lager_lines::secret::{Meeting, Nonce, Secrets, Side};
 /// The gate of one connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Gate {
-    /// All that is said passes.
+    /// The gate lets every line pass.
     Open,
-    /// Nothing has been said, and who says a name is to prove it.
+    /// The peer has said nothing. If it says a name, it must prove it.
     Fresh,
-    /// A robot is to prove its name, with what it has said and what it was asked.
+    /// The robot must prove its name; with its first line and the gate's question.
     Asked(Hello, Nonce),
-    /// It speaks the document's language and has no name of its own.
+    /// The robot speaks the document's language and has no name of its own.
     Plain,
 }
 
-/// What becomes of a line.
+/// The gate's verdict on a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// The station hears it.
+    /// The station gets the line.
     Pass,
-    /// The peer is asked for a proof, and the station hears nothing.
+    /// The gate asks the peer for a proof. The station does not get the line.
     Ask(Proof),
-    /// The peer has proved who it is; it is told the station's own proof, and the station hears
-    /// the robot's first line.
+    /// The peer has proved its name. It gets the station's own proof, and the station gets the
+    /// robot's first line.
     Proved(Proof, Hello),
     /// The connection ends, and the peer is told why.
     Refuse(String),
 }
 
 impl Gate {
-    /// That of a new connection.
+    /// The gate of a new connection.
     pub(crate) fn new(secrets: &Secrets) -> Self {
         match secrets.is_empty() {
             true => Self::Open,
@@ -50,7 +50,7 @@ impl Gate {
         }
     }
 
-    /// Judges a line; `nonce` is asked for where a proof is.
+    /// Judges a line. Takes a `nonce` for the question when the peer must prove its name.
     pub(crate) fn judge(
         &mut self,
         secrets: &Secrets,
@@ -60,7 +60,7 @@ impl Gate {
         let hello = Hello::read(line);
         match (&*self, hello) {
             (Self::Open, _) | (Self::Plain, None) => Verdict::Pass,
-            // The station says what is wrong with it.
+            // The station itself says what is wrong with it.
             (Self::Fresh, Some(Err(_))) => Verdict::Pass,
             (Self::Fresh, None) => {
                 *self = Self::Plain;
@@ -90,13 +90,13 @@ impl Gate {
                 verdict
             }
             (Self::Plain, Some(_)) => Verdict::Refuse(
-                "who has a name says it in the first line of a connection".to_owned(),
+                "a robot says its name in the first line of a connection".to_owned(),
             ),
         }
     }
 }
 
-/// The station's proof, if `line` is the robot's.
+/// The station's own proof, if `line` is a right proof of the robot.
 fn prove(secrets: &Secrets, robot: &Name, stations: Nonce, line: &str) -> Option<Proof> {
     let Some(Ok(Proof::Robot(robots, code))) = Proof::read(line) else {
         return None;

@@ -1,14 +1,13 @@
-//! What somebody wants, and for how long he has wanted it already.
+//! A person's wish, and how old it is.
 
 use std::time::Duration;
 
-/// A wish that has been under way before the station learns of it. One that has not is made of the
-/// wish alone.
+/// A wish, and how long it took to reach the station. `From` makes a wish of this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Given<T> {
-    /// What is wanted.
+    /// What the person wants.
     pub what: T,
-    /// How long ago it was given.
+    /// How long ago the person wished it.
     pub late: Duration,
 }
 

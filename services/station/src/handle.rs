@@ -1,13 +1,13 @@
-//! What other threads see of the station and do with it.
+//! The handle by which other threads see the station and act on it.
 //!
-//! The station is behind one lock that nobody holds while he waits for a peer or for the disk.
+//! One lock guards the station. No thread holds it while it waits for a peer or for the disk.
 //!
 //! ```no_run
 //! use std::time::Duration;
 //!
 //! use lager_lines::Name;
 //! use lager_lines::command::read_wheels;
-//! use lager_lines::extension::{Action, Mode};
+//! use lager_orders::{Action, Mode};
 //! use lager_station::{Handle, Reply};
 //!
 //! fn take_over(handle: &Handle, robot: &Name) -> Result<(), Box<dyn std::error::Error>> {
@@ -28,22 +28,21 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
-use lager_lines::command::Wheels;
-use lager_lines::extension::Action;
+use lager_orders::{Action, Reason, Wheels};
+use lager_plant::Warehouse;
 use lager_wire::OperatorArm;
 
 use crate::awaited::{Awaited, Outlets, Saved, Saving, Subscription};
 use crate::given::Given;
 use crate::robot::Doing;
-use crate::shown::{Shown, Told};
-use crate::station::{News, Station, Wish, WishRefused};
-use crate::warehouse::{Warehouse, WarehouseError};
+use crate::shown::{Saying, Shown};
+use crate::station::{RobotSaid, Station, Wish, WishRefused};
 use crate::wheel::Key;
 
-/// What the station's clock shows when it starts: what robots tell of before that has a moment, too.
+/// The station's clock starts at this time, so that earlier events of robots have a time as well.
 const ORIGIN: Duration = Duration::from_secs(24 * 3_600);
 
-/// The station, for any thread; clones are of the same one.
+/// The station for other threads. All clones lead to the same station.
 #[derive(Clone, Debug)]
 pub struct Handle {
     shared: Arc<Shared>,
@@ -64,31 +63,31 @@ pub(crate) struct Shared {
 #[derive(Debug)]
 struct State {
     station: Station,
-    /// Grows with whatever may have changed.
+    /// Grows with every change.
     revision: u64,
     outlets: Outlets,
 }
 
-/// What is to be seen of one robot at a moment.
+/// What the station knows about one robot at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Its name.
     pub name: Name,
-    /// What its questions tell of what it is doing.
+    /// What the robot is doing, as its questions show.
     pub doing: Doing,
-    /// Whether it takes actions.
+    /// Whether the robot takes actions.
     pub is_extended: bool,
-    /// Who drives it by actions.
+    /// The person who drives it by actions.
     pub driver: Option<String>,
-    /// The last of each kind that it has shown.
+    /// The last report of each kind.
     pub shown: Shown,
     /// The moment, by the station's clock; see [`Seen::age`](crate::Seen::age).
     pub now: Duration,
 }
 
-/// What people do with robots.
+/// The actions of people.
 impl Handle {
-    /// All robots that are known, with the last that each has shown and when.
+    /// All robots that the station knows, with the last reports of each and their times.
     pub fn robots(&self) -> Vec<View> {
         let now = self.now();
         self.look(|station| {
@@ -104,23 +103,23 @@ impl Handle {
         })
     }
 
-    /// What robots say from now on.
+    /// Subscribes to everything that robots tell from now on.
     pub fn subscribe(&self) -> Subscription {
         self.lock().outlets.subscribe(false)
     }
 
-    /// What robots have said lately, the last [`Subscription::KEPT`] of all robots together, and
-    /// then what they say from now on.
+    /// The last news of all robots, at most [`Subscription::KEPT`], and then everything that robots
+    /// tell from now on.
     pub fn recall(&self) -> Subscription {
         self.lock().outlets.subscribe(true)
     }
 
-    /// Gives a robot an action, and lets its answer be awaited. Whoever moves it is its
-    /// [`Driver`].
+    /// Gives a robot an action, and returns a value that waits for the answer. To move the robot,
+    /// use [`Driver`].
     ///
     /// # Errors
     ///
-    /// When it takes no action, or this one is its driver's.
+    /// The robot takes no action, or only its driver may give this one.
     pub fn act(
         &self,
         robot: &Name,
@@ -129,12 +128,12 @@ impl Handle {
         self.ask(robot, |station| station.act(robot, action))
     }
 
-    /// Stops a robot, whoever drives it. `None`: it is told, and speaks only the document's
-    /// language, which confirms nothing.
+    /// Stops a robot, whoever drives it. `None` if the robot speaks only the document's language:
+    /// the station has sent the stop, but such a robot confirms nothing.
     ///
     /// # Errors
     ///
-    /// When it speaks only that and does not ask for commands.
+    /// The robot speaks only the document's language and does not ask for commands.
     pub fn stop(&self, robot: &Name) -> Result<Option<Awaited>, WishRefused> {
         let stopped = self.work(|state| {
             let number = state.station.stop(robot)?;
@@ -144,22 +143,21 @@ impl Handle {
         stopped
     }
 
-    /// Keeps that somebody here has asked something of a robot, for whoever reads what has happened.
+    /// Records that somebody has asked a robot for something, for those who read the news.
     pub fn note(&self, robot: &Name, by: &str, what: &str) {
-        let told = Told::Asked {
+        let told = Saying::Asked {
             by: by.to_owned(),
             what: what.to_owned(),
         };
         let (robot, at) = (robot.clone(), self.now());
-        self.work(|state| state.outlets.hand_on(vec![News { robot, at, told }]));
+        self.work(|state| state.outlets.hand_on(vec![RobotSaid { robot, at, told }]));
     }
 
-    /// Lets `who` drive a robot, and nobody else as long as the driver is there and says something
-    /// every 3 s.
+    /// Lets only `who` drive a robot, as long as the driver exists and says something every 3 s.
     ///
     /// # Errors
     ///
-    /// When somebody else drives it; the error names him.
+    /// Another person drives it. The error says who.
     pub fn take_wheel(&self, robot: &Name, who: &str) -> Result<Driver, WishRefused> {
         let key = self.change(|station| station.take_wheel(robot, who))?;
         Ok(Driver {
@@ -169,25 +167,24 @@ impl Handle {
         })
     }
 
-    /// Does what a person wants of a robot in the document's language.
+    /// Does what a person wants of a robot, in the document's language.
     ///
     /// # Errors
     ///
-    /// When it cannot be done; nothing has changed then.
+    /// The station cannot do it. Nothing has changed then.
     pub fn wish(&self, robot: &Name, wish: Wish) -> Result<(), WishRefused> {
         let result = self.change(|station| station.wish(robot, wish));
         self.wake();
         result
     }
 
-    /// Gives the station another warehouse, which is then saved. It is in force even if the disk
-    /// does not take it. What robots do with it that know another one already, the sentence of the
-    /// [`Saving`] says.
+    /// Gives the station another warehouse and saves it. The station uses it even if the disk
+    /// refuses it. The [`Saving`] says what robots do that know another warehouse.
     ///
     /// # Errors
     ///
-    /// When there can be no such warehouse.
-    pub fn set_warehouse(&self, warehouse: Warehouse) -> Result<Saving, WarehouseError> {
+    /// Such a warehouse cannot exist.
+    pub fn set_warehouse(&self, warehouse: Warehouse) -> Result<Saving, Reason> {
         let kept_in = self.shared.kept_in.clone();
         let result = self.work(|state| {
             state.station.set_warehouse(warehouse)?;
@@ -212,7 +209,7 @@ impl Handle {
     }
 }
 
-/// Who drives a robot. When it is dropped the robot stands, and somebody else may drive.
+/// The right to drive a robot. When it is dropped the robot stands, and somebody else may drive.
 #[derive(Debug)]
 pub struct Driver {
     handle: Handle,
@@ -221,12 +218,13 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// Turns the wheels for 150 ms from when the robot hears it, unless this is called again: every
-    /// 100 ms, say. A turn of 45 degrees ends by itself, and standing lasts.
+    /// Turns the wheels for 150 ms from the moment when the robot gets the command. To drive on,
+    /// call this again every 100 ms. A turn of 45 degrees ends by itself. The command to stand
+    /// lasts.
     ///
     /// # Errors
     ///
-    /// When he drives it no more, or the robot takes no action.
+    /// This driver may not drive any more, or the robot takes no actions.
     pub fn drive(&self, wheels: impl Into<Given<Wheels>>) -> Result<Awaited, WishRefused> {
         let drive = |station: &mut Station| station.drive(&self.robot, self.key, wheels);
         self.handle.ask(&self.robot, drive)
@@ -242,11 +240,11 @@ impl Driver {
         self.handle.ask(&self.robot, arm)
     }
 
-    /// Says that he is still there, though he drives nowhere.
+    /// Says that the driver is still there, and moves nothing.
     ///
     /// # Errors
     ///
-    /// When he drives it no more.
+    /// This driver may not drive any more.
     pub fn stay(&self) -> Result<(), WishRefused> {
         let stay = |station: &mut Station| station.stay(&self.robot, self.key);
         self.handle.change(stay)
@@ -261,7 +259,7 @@ impl Drop for Driver {
     }
 }
 
-/// The station as it is.
+/// What the threads share.
 impl Handle {
     pub(crate) fn new(station: Station, waker: UnixStream, kept_in: Option<PathBuf>) -> Self {
         Self {
@@ -279,7 +277,7 @@ impl Handle {
         }
     }
 
-    /// Looks at the station, which stands still meanwhile: copy, do not work.
+    /// Calls `look` with the station. The station waits meanwhile, so copy and do nothing else.
     pub fn look<R>(&self, look: impl FnOnce(&Station) -> R) -> R {
         look(&self.lock().station)
     }
@@ -289,7 +287,7 @@ impl Handle {
         self.lock().revision
     }
 
-    /// Waits until the number of the last change is another one than `seen`, at most `timeout`, and
+    /// Waits until the number of the last change differs from `seen`, at most `timeout`, and
     /// returns it.
     pub fn wait(&self, seen: u64, timeout: Duration) -> u64 {
         let shared = &self.shared;
@@ -299,12 +297,12 @@ impl Handle {
         waited.unwrap_or_else(PoisonError::into_inner).0.revision
     }
 
-    /// Takes from the station what nobody sees.
+    /// Takes the station's outputs that nobody else sees.
     pub(crate) fn take<R>(&self, take: impl FnOnce(&mut Station) -> R) -> R {
         take(&mut self.lock().station)
     }
 
-    /// Takes the warehouse that is to be saved, and who waits for that.
+    /// Takes the warehouse that must be saved, and those who wait for that.
     pub(crate) fn unsaved(&self) -> (Option<Warehouse>, Vec<Saved>) {
         let mut state = self.lock();
         (state.station.unsaved(), state.outlets.savings())
@@ -316,7 +314,7 @@ impl Handle {
         state.turn(self.now());
     }
 
-    /// Changes the station and tells who waits.
+    /// Changes the station and tells the threads that wait.
     pub(crate) fn change<R>(&self, change: impl FnOnce(&mut Station) -> R) -> R {
         self.work(|state| change(&mut state.station))
     }
@@ -338,12 +336,13 @@ impl Handle {
     }
 
     fn wake(&self) {
-        // One that is full wakes as well.
+        // A full pipe wakes the thread as well.
         let _ = (&self.shared.waker).write(&[0]);
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // It is never left half changed: a panic below comes from the handling of one line.
+        // A panic cannot leave the station half changed: below, it comes from the handling of one
+        // line.
         let state = self.shared.state.lock();
         state.unwrap_or_else(PoisonError::into_inner)
     }

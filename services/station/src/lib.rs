@@ -8,18 +8,21 @@
 //!              whoever shows robots and acts on them
 //! ```
 //!
-//! - [`Robot`]: the conversation with one robot, a pure state machine: lines and a person's wishes
-//!   in, lines out.
-//! - [`Station`]: the robots by their names and the GaG that speaks for one of them, as pure.
-//! - [`Warehouse`]: squares, delivery and goods, as they lie in a file that is saved atomically.
-//! - [`Queues`]: what waits to be fetched by each robot, in a file beside it.
-//! - [`files`]: how files that a person has named are read, replaced and held.
+//! - [`Robot`]: the conversation with one robot. It is a pure state machine: lines and a person's
+//!   wishes in, lines out.
+//! - [`Station`]: all robots by their names, and the GaG that speaks for one of them; pure, too.
+//! - [`load`] and [`save`]: the warehouse, in a file that is saved atomically.
+//! - [`Queues`]: the products that each robot will fetch, in a file beside the warehouse's.
+//! - [`files`]: reads, replaces and locks files that a person has named.
 //! - [`Server`]: the sockets, in one thread that waits for all of them.
-//! - [`Handle`]: what another thread sees of the station and does with it: the last that each robot
-//!   has shown and when, a [`Subscription`] to events and thoughts, actions whose answer is
-//!   [`Awaited`], and one [`Driver`] for each robot.
+//! - [`Handle`]: the station for other threads. They see the last state of each robot with its
+//!   time, subscribe to news ([`Subscription`]), give actions and wait for the answer
+//!   ([`Awaited`]), and drive a robot ([`Driver`], one for each).
 //!
-//! It never joins a robot's bus. It knows only what robots have told it.
+//! The station never joins a robot's bus. It knows only what robots have told it, and keeps its
+//! state in files. `lager up` opens the socket and hands it to each station that it starts, so the
+//! port stays open when a station ends. A GaG must read the station's lines. If it does not, the
+//! robot that it drives stands within half a second.
 
 mod asked;
 mod awaited;
@@ -30,6 +33,7 @@ mod gate;
 mod given;
 mod handle;
 mod queues;
+mod refused;
 mod robot;
 mod saver;
 mod server;
@@ -47,7 +51,7 @@ pub use handle::{Driver, Handle, View};
 pub use queues::Queues;
 pub use robot::{ActRefused, CommandRefused, Doing, FetchRefused, Robot};
 pub use server::Server;
-pub use shown::{Reply, Seen, Shown, Told};
-pub use station::{News, Output, Peer, Station, Uses, Wish, WishRefused};
-pub use warehouse::{LoadError, SaveError, StoredProduct, Warehouse, WarehouseError, load, save};
+pub use shown::{Reply, Saying, Seen, Shown};
+pub use station::{Output, Peer, RobotSaid, Station, Uses, Wish, WishRefused};
+pub use warehouse::{LoadError, SaveError, find, load, save, told};
 pub use wheel::Key;

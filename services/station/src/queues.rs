@@ -1,13 +1,13 @@
-//! The robots' queues as they lie in a file beside the warehouse's, so that orders outlive a
-//! station that was killed.
+//! The robots' queues, in a file beside the warehouse's file. So orders are not lost when a station
+//! is killed.
 //!
 //! ```toml
 //! r1 = [3, 1, 2]                # the next one first
 //! r2 = [7]
 //! ```
 //!
-//! It is saved after robots have been told. So a product that a robot was told at the last moment
-//! may still be in the file and be told again, but none is lost.
+//! The station tells a robot its product first, and saves the file then. If the station is killed
+//! in between, it tells the robot this product again. No product is lost.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -18,23 +18,23 @@ use serde::{Deserialize, Serialize};
 use crate::files::{self, ReadError};
 use crate::warehouse::{SaveError, save_toml};
 
-/// The products that wait, by robot; robots for which none waits are left out.
+/// The products that wait, by robot, without the robots that have none.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Queues(pub BTreeMap<String, Vec<i32>>);
 
 impl Queues {
-    /// Where they lie for the warehouse of `warehouse`.
+    /// The queues' file for the warehouse in the file `warehouse`.
     pub fn beside(warehouse: &Path) -> PathBuf {
         files::beside(warehouse, "queue")
     }
 
-    /// Reads them; none where there is no file. A file that holds something else is moved out of
-    /// the way, which is said: what waited is lost, and everything else goes on.
+    /// Reads the queues; no file means no queues. If the file holds something else, the station
+    /// moves it aside and logs that its orders are lost. Everything else goes on.
     ///
     /// # Errors
     ///
-    /// When the file is there and is not read.
+    /// The file exists and cannot be read.
     pub fn load(path: &Path) -> Result<Self, ReadError> {
         match files::read_toml(path) {
             Err(ReadError::Read { error, .. }) if error.kind() == io::ErrorKind::NotFound => {
@@ -46,18 +46,18 @@ impl Queues {
                     error,
                 })?;
                 let aside = aside.display();
-                tracing::warn!("what waited to be fetched is lost: {error}; it is now {aside}");
+                tracing::warn!("the orders that waited are lost: {error}; the file is now {aside}");
                 Ok(Self::default())
             }
             read => read,
         }
     }
 
-    /// Saves them as the warehouse is saved.
+    /// Saves the queues in the same way as the warehouse.
     ///
     /// # Errors
     ///
-    /// When the disk does not take them.
+    /// The disk refuses the file.
     pub fn save(&self, path: &Path) -> Result<(), SaveError> {
         save_toml(path, self)
     }

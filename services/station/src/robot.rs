@@ -1,8 +1,8 @@
-//! The conversation with one robot as the external computer sees it. The external computer answers
-//! by itself, or passes on what a GaG answers while one speaks for this robot.
+//! The station's side of the conversation with one robot. The station answers from what it knows,
+//! or passes on the answers of a GaG that speaks for this robot.
 //!
 //! ```text
-//!  the robot asks            it is answered
+//!  the robot asks            the station answers
 //!  sidelength, karta,        from the warehouse, at once or when there is one (AMB-42)
 //!  prodlis
 //!  fetchprod                 with the first product of the queue, or when one is put in (AMB-43)
@@ -10,37 +10,43 @@
 //!  armcomm                   with pickup_done, once a person has said so and no command waits
 //! ```
 //!
-//! - One question is held. A new question takes its place, and the old one is never answered.
-//! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
-//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait, and of a pickup_done
-//!   behind them, after which the robot would drive off. A robot that speaks the extension is told
-//!   it at once, though it asks nothing while it turns. When the robot asks for something else, its
-//!   connection ends or somebody takes its wheel, they are dropped: nobody's old command moves it
-//!   later.
-//! - A product leaves the queue when the robot is told it. If the connection ends before the robot
-//!   has said another word, it is put back, since it may not have arrived.
+//! - The station remembers one open question. A new question replaces it, and the old one is never
+//!   answered.
+//! - The station takes commands only while the robot asks for them: when a person drives it, or
+//!   when it stands at goods. At most [`Robot::MOST_COMMANDS`] wait.
+//! - A stop replaces all commands that wait, and also a `pickup_done` behind them, because the
+//!   robot would drive off after it. If the robot speaks the extension, the station sends it the
+//!   stop at once, even while the robot turns and asks nothing.
+//! - The station drops the commands that wait when the robot asks for something else, when its
+//!   connection ends, and when somebody takes its wheel. So no old command moves the robot later.
+//! - A product leaves the queue when the station tells it to the robot. If the connection ends
+//!   before the robot has said another word, the product may not have arrived, so the station puts
+//!   it back.
 //! - The queue outlives connections.
-//! - While a GaG speaks for the robot only commands are answered from here: those that it gave
-//!   before it was asked, and those that were given besides, a stop above all. The robot stands
-//!   when a GaG that drives it leaves, or somebody takes the wheel from it.
+//! - While a GaG speaks for the robot, the station itself sends only commands: those that the GaG
+//!   gave before the robot asked, and those of other people, most of all a stop. The robot stands
+//!   when a GaG that drives it leaves, or when somebody takes the wheel from the GaG.
 //!
-//! - A robot that speaks the extension is given numbered actions besides, and answers each. What it
-//!   shows of itself is kept with the time when it came ([`Shown`]). Who drives it by actions holds
-//!   its seat (`wheel.rs`); anybody may stop it.
+//! - A robot that speaks the extension also takes numbered actions, and answers each. The station
+//!   keeps its last state with the time when it arrived ([`Shown`]). A person who drives it by
+//!   actions holds its wheel (`wheel.rs`). Anybody may stop it.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use lager_floor::{Grid, Heading, Node, ProductId, SideLength};
 use lager_lines::conversation::{AnswerRefused, Held, RobotLine, StationLine};
 use lager_lines::extension::{Hello, Order};
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::{Coord, Direction, Map, Name, ProductId, Products, SideLength, Text, TooLate};
+use lager_lines::{Name, Products, Text};
+use lager_orders::{Code, Reason, lease::TooLate};
+use lager_plant::Warehouse;
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
 use crate::asked::Asked;
-use crate::shown::{Shown, Told};
-use crate::warehouse::{Warehouse, WarehouseError};
+use crate::shown::{Saying, Shown};
+use crate::warehouse;
 use crate::wheel::Wheel;
 
 mod actions;
@@ -48,7 +54,7 @@ mod known;
 
 pub(crate) use known::Other;
 
-/// What a robot is doing, as far as its questions tell.
+/// What a robot is doing, as its questions show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Doing {
     /// It is not connected.
@@ -56,107 +62,117 @@ pub enum Doing {
     Away,
     /// It is connected and asks about the warehouse.
     Starting,
-    /// It waits to be told what to fetch.
+    /// It waits for an order.
     Idle,
     /// It fetches a product by itself.
     Fetching,
     /// It stands at the goods and asks for steps of the arm (C7).
     Picking,
-    /// It is driven by hand (C4).
+    /// A person drives it by hand (C4).
     ByHand,
 }
 
 impl Doing {
-    /// Whether it takes commands.
+    /// Whether the robot takes commands now.
     pub const fn takes_commands(self) -> bool {
         matches!(self, Self::Picking | Self::ByHand)
     }
 }
 
-/// Why a command is not given to a robot.
+/// Why the station does not give a robot a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("{}", Reason::from(*self))]
 pub enum CommandRefused {
-    /// It does not ask for any.
-    #[error(
-        "the robot takes no commands now; it does when it is switched to manual or stands at goods"
-    )]
+    /// The robot does not ask for commands.
     NotAsked,
-    /// It is slower than the person who gives them.
-    #[error(
-        "{} commands wait already; wait until the robot has taken some, or stop it",
-        Robot::MOST_COMMANDS
-    )]
+    /// Too many commands wait already.
     Full,
-    /// There are no goods to be picked up.
-    #[error("the robot does not stand at goods, so nothing was picked up")]
+    /// The robot is not at goods.
     NotPicking,
 }
 
-/// Why an action is not given to a robot.
+impl From<CommandRefused> for Reason {
+    fn from(why: CommandRefused) -> Self {
+        match why {
+            CommandRefused::NotAsked => Code::NotAsked.into(),
+            CommandRefused::Full => Self::new(Code::CommandsFull, &[&Robot::MOST_COMMANDS]),
+            CommandRefused::NotPicking => Code::NothingPicked.into(),
+        }
+    }
+}
+
+/// Why the station does not give a robot an action.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}", Reason::from(self))]
 pub enum ActRefused {
-    /// It does not understand any.
-    #[error("the robot speaks only the document's language, or is away; it takes no actions")]
+    /// The robot understands no actions.
     Plain,
-    /// It does not answer.
-    #[error(
-        "{} actions are unanswered already; wait for the robot, or stop it",
-        Asked::MOST
-    )]
+    /// The robot does not answer.
     Full,
     /// Somebody else drives.
-    #[error("{by} drives the robot; wait until he has left, or stop it")]
     Driven {
         /// Who.
         by: String,
     },
-    /// Only who drives it may.
-    #[error("the robot is moved by its driver alone; take the wheel first")]
+    /// Only its driver may give it.
     NotDriver,
-    /// It was given too long ago.
-    #[error(transparent)]
+    /// A person gave it too long ago.
     Late(#[from] TooLate),
 }
 
-/// Why a product is not put in a robot's queue.
+impl From<&ActRefused> for Reason {
+    fn from(why: &ActRefused) -> Self {
+        match why {
+            ActRefused::Plain => Code::Plain.into(),
+            ActRefused::Full => Self::new(Code::ActsFull, &[&Asked::MOST]),
+            ActRefused::Driven { by } => Self::new(Code::Driven, &[by]),
+            ActRefused::NotDriver => Code::DriverOnly.into(),
+            ActRefused::Late(late) => (*late).into(),
+        }
+    }
+}
+
+/// Why the station does not put a product in a robot's queue.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}", Reason::from(self))]
 pub enum FetchRefused {
     /// There is no such product.
-    #[error("there is no product {product} in the warehouse")]
     Unknown {
         /// Its number.
         product: ProductId,
     },
-    /// It waits already, or is under way. There is one piece of goods for each number.
-    #[error("product {product} is ordered already")]
+    /// The product waits already, or the robot is fetching it. There is one piece of each product.
     Ordered {
         /// Its number.
         product: ProductId,
     },
-    /// Its goods were delivered, or were not found.
-    #[error(
-        "product {product} is not in its place, as robot {robot} has seen; put it back and say \
-         `lager map back {product}`"
-    )]
+    /// The product was delivered, or a robot did not find it.
     Gone {
         /// Its number.
         product: ProductId,
-        /// Who has seen it.
+        /// The robot that has seen it.
         robot: Name,
     },
-    /// Too many wait.
-    #[error(
-        "{} products wait already; wait until some are delivered",
-        Robot::MOST_PRODUCTS
-    )]
+    /// Too many products wait.
     Full,
 }
 
-/// What a robot was told of the warehouse.
+impl From<&FetchRefused> for Reason {
+    fn from(why: &FetchRefused) -> Self {
+        match why {
+            FetchRefused::Unknown { product } => Self::new(Code::NoProduct, &[product]),
+            FetchRefused::Ordered { product } => Self::new(Code::Ordered, &[product]),
+            FetchRefused::Gone { product, robot } => Self::new(Code::Gone, &[product, robot]),
+            FetchRefused::Full => Self::new(Code::ProductsFull, &[&Robot::MOST_PRODUCTS]),
+        }
+    }
+}
+
+/// What the station has told a robot of the warehouse.
 #[derive(Clone, Debug, Default)]
 struct Known {
     side: Option<SideLength>,
-    map: Option<Map>,
+    map: Option<Grid>,
     products: Option<Products>,
 }
 
@@ -176,57 +192,54 @@ impl Known {
 pub struct Robot {
     doing: Doing,
     held: Held,
-    /// As it has announced itself, if it speaks the extension.
+    /// Its announcement, if it speaks the extension.
     hello: Option<Hello>,
-    warehouse: Option<(SideLength, Map, Products)>,
-    /// What of it, and of those before it, the robot was told last.
+    warehouse: Option<(SideLength, Grid, Products)>,
+    /// What the station last told this robot, or one of this name before it, of the warehouse.
     known: Known,
     queue: VecDeque<ProductId>,
-    /// The product that it was told last.
+    /// The last product that the station told it.
     told: Option<ProductId>,
-    /// Whether it has not been heard since it was told.
+    /// Whether the robot has said nothing since then.
     is_unanswered: bool,
     commands: VecDeque<OperatorCommand>,
     is_picked: bool,
-    /// The last command to its wheels was another than to stand.
+    /// The last command to its wheels was not the command to stand.
     turns_wheels: bool,
     has_gag: bool,
-    node: Option<Coord>,
-    looks: Option<Direction>,
+    node: Option<Node>,
+    looks: Option<Heading>,
     thought: Option<Text>,
     now: Duration,
     shown: Shown,
     asked: Asked,
     wheel: Wheel,
-    /// What it has said and nobody has taken yet.
-    told_news: Vec<Told>,
+    /// What the robot has said, until somebody takes it.
+    told_news: Vec<Saying>,
 }
 
-/// What a person wants of it. What is returned is said to the robot, in this order.
+/// What a person wants of the robot. Each method returns lines for the robot, in this order.
 impl Robot {
-    /// Commands that may wait, at most (C5).
+    /// How many commands may wait (C5).
     pub const MOST_COMMANDS: usize = 32;
-    /// Products that may wait, at most.
+    /// How many products may wait.
     pub const MOST_PRODUCTS: usize = 256;
 
-    /// The warehouse is known, or is another one.
+    /// Tells the robot of a warehouse, a first one or a new one.
     ///
     /// # Errors
     ///
-    /// When there can be no such warehouse; the one before is kept.
-    pub fn set_warehouse(
-        &mut self,
-        warehouse: &Warehouse,
-    ) -> Result<Option<StationLine>, WarehouseError> {
-        self.warehouse = Some(warehouse.check()?);
+    /// Such a warehouse cannot exist. The robot keeps the one before.
+    pub fn set_warehouse(&mut self, warehouse: &Warehouse) -> Result<Option<StationLine>, Reason> {
+        self.warehouse = Some(warehouse::told(warehouse)?);
         Ok(self.answer())
     }
 
-    /// Gives a command. A stop takes the place of all that wait, and of a pickup_done.
+    /// Gives a command. A stop replaces all commands that wait, and a pickup_done.
     ///
     /// # Errors
     ///
-    /// When the robot does not ask for commands or too many wait.
+    /// The robot does not ask for commands, or too many wait.
     pub fn command(
         &mut self,
         command: OperatorCommand,
@@ -248,12 +261,12 @@ impl Robot {
         Ok(self.answer())
     }
 
-    /// Stops the robot: in the extension's lane of its own if it speaks that, else by a command.
-    /// The number is that of the confirmation, which only the extension has.
+    /// Stops the robot: at once if it speaks the extension, else by a command. Only the extension
+    /// confirms a stop; the number is that of the confirmation.
     ///
     /// # Errors
     ///
-    /// When it speaks only the document's language and does not ask for commands.
+    /// The robot speaks only the document's language and does not ask for commands.
     pub fn stop(&mut self) -> Result<(Option<u32>, Option<StationLine>), CommandRefused> {
         if self.hello.is_none() {
             return Ok((None, self.command(OperatorCommand::Stop)?));
@@ -265,11 +278,11 @@ impl Robot {
         Ok((number, Some(StationLine::Order(Order::Stop { number }))))
     }
 
-    /// The goods are in the gripper (Q5). Commands that wait are given first.
+    /// A person says that the goods are in the gripper (Q5). Commands that wait go first.
     ///
     /// # Errors
     ///
-    /// When the robot does not stand at goods.
+    /// The robot does not stand at goods.
     pub fn picked_up(&mut self) -> Result<Option<StationLine>, CommandRefused> {
         if self.doing != Doing::Picking {
             return Err(CommandRefused::NotPicking);
@@ -278,11 +291,11 @@ impl Robot {
         Ok(self.answer())
     }
 
-    /// Has a product fetched after those that wait (F3).
+    /// Puts a product at the end of the queue (F3).
     ///
     /// # Errors
     ///
-    /// When the warehouse does not have it or too many wait.
+    /// The warehouse has no such product, or too many wait.
     pub fn fetch(&mut self, product: ProductId) -> Result<Option<StationLine>, FetchRefused> {
         let products = self.warehouse.iter().flat_map(|(_, _, all)| all.as_slice());
         if !products.into_iter().any(|one| one.id == product) {
@@ -305,7 +318,7 @@ impl Robot {
         Ok(self.answer())
     }
 
-    /// Whether this product waits here, or the robot that is connected is told to fetch it.
+    /// Whether this product waits here, or the connected robot is fetching it.
     fn is_ordered(&self, product: ProductId) -> bool {
         if self.queue.contains(&product) {
             return true;
@@ -324,17 +337,16 @@ impl Robot {
         is_told || shows && self.hello.is_some()
     }
 
-    /// Takes the first of the products that wait with this number out of the queue; tells whether
-    /// there was one.
+    /// Takes the first product with this number out of the queue. Returns whether there was one.
     pub fn cancel(&mut self, product: ProductId) -> bool {
         let place = self.queue.iter().position(|waits| *waits == product);
         place.and_then(|place| self.queue.remove(place)).is_some()
     }
 }
 
-/// What a GaG says for it.
+/// What a GaG says for the robot.
 impl Robot {
-    /// Whether a GaG speaks for it from now on. One that leaves drives it no further.
+    /// Sets whether a GaG speaks for the robot. When a GaG leaves, its last command ends.
     pub fn set_gag(&mut self, has_gag: bool) -> Option<StationLine> {
         let has_left = core::mem::replace(&mut self.has_gag, has_gag) && !has_gag;
         let stands = has_left.then(|| self.end_commands()).flatten();
@@ -345,14 +357,15 @@ impl Robot {
     ///
     /// # Errors
     ///
-    /// When the robot asks nothing, or something else. It is not told.
+    /// The robot asks nothing, or something else. It does not get the answer.
     pub fn given(&mut self, answer: Answer) -> Result<StationLine, AnswerRefused> {
         let query = self.held.answer(&answer)?;
         self.known.take(&answer);
         match answer {
             Answer::Fetch(product) => {
                 self.begin(product);
-                // If it does not arrive, the robot asks again and the GaG with it.
+                // If the answer does not arrive, the robot asks again, and the station asks the GaG
+                // again.
                 self.is_unanswered = false;
             }
             Answer::PickupDone => self.doing = Doing::Fetching,
@@ -368,15 +381,15 @@ impl Robot {
     }
 }
 
-/// What the robot does.
+/// What the robot itself does.
 impl Robot {
-    /// It has connected.
+    /// The robot has connected.
     pub fn connected(&mut self) {
         self.disconnected();
         self.doing = Doing::Starting;
     }
 
-    /// Its connection has ended.
+    /// The robot's connection has ended.
     pub fn disconnected(&mut self) {
         if let Some(product) = self.told.take_if(|_| self.is_unanswered) {
             self.queue.push_front(product);
@@ -391,9 +404,9 @@ impl Robot {
         self.lose(lost);
     }
 
-    /// It has said something. What is returned is said to it.
+    /// The robot has sent a line. Returns the lines for the robot.
     pub fn heard(&mut self, line: RobotLine) -> Option<StationLine> {
-        // An announcement is repeated as a sign of life, and may have been under way before.
+        // The robot repeats its announcement as a sign of life; it may be an old one.
         if !matches!(line, RobotLine::Hello(_)) {
             self.is_unanswered = false;
         }
@@ -402,7 +415,7 @@ impl Robot {
             RobotLine::Request(Request::Telemetry(telemetry)) => match telemetry {
                 Telemetry::Thought(thought) => {
                     self.thought = Some(thought.clone());
-                    self.told_news.push(Told::Thought(thought));
+                    self.told_news.push(Saying::Thought(thought));
                 }
                 Telemetry::Robot(node) => self.node = Some(node),
                 Telemetry::Heading(looks) => self.looks = Some(looks),
@@ -411,23 +424,25 @@ impl Robot {
             RobotLine::Report(report) => {
                 let told = self.shown.take(report, self.now);
                 self.told_news.extend(told.filter(|told| match told {
-                    // What nobody waits for is no news.
-                    Told::Replied { number, .. } => self.asked.close(*number),
-                    Told::Event(_)
-                    | Told::Thinks(_)
-                    | Told::Thought(_)
-                    | Told::Past { .. }
-                    | Told::Asked { .. } => true,
+                    // An answer that nobody waits for is no news.
+                    Saying::Replied { number, .. } => self.asked.close(*number),
+                    Saying::Event(_)
+                    | Saying::Thinks(_)
+                    | Saying::Because(_)
+                    | Saying::Thought(_)
+                    | Saying::Past { .. }
+                    | Saying::Asked { .. } => true,
                 }));
             }
         }
         None
     }
 
-    /// People are told this of it.
+    /// Whether people get this as news.
     pub(crate) fn is_told(&mut self, why: &str) {
         let text = Text::new(why.replace(['\r', '\n'], " "));
-        self.told_news.push(Told::Thought(text.unwrap_or_default()));
+        self.told_news
+            .push(Saying::Thought(text.unwrap_or_default()));
     }
 
     fn asked(&mut self, query: Query) -> Option<StationLine> {
@@ -444,13 +459,13 @@ impl Robot {
         if self.doing != Doing::Starting
             && let Some((side, map, products)) = &self.warehouse
         {
-            // What it does not ask for it has been told by a station before this one.
+            // A station before this one has told the robot what it does not ask for.
             self.known.side.get_or_insert(*side);
             self.known.map.get_or_insert(*map);
             let known = &mut self.known.products;
             known.get_or_insert_with(|| products.clone());
         }
-        // One of this project asks for either kind of command in a mode of its own.
+        // A robot of this project asks for each kind of command in another mode.
         let has_turned = self.hello.is_some() && self.doing != before;
         if has_turned || !self.doing.takes_commands() {
             self.drop_commands();
@@ -460,32 +475,32 @@ impl Robot {
         self.answer()
     }
 
-    /// It is told to fetch `product`.
+    /// Tells the robot to fetch `product`.
     fn begin(&mut self, product: ProductId) {
         self.told = Some(product);
         self.is_unanswered = true;
         self.doing = Doing::Fetching;
     }
 
-    /// Whether it turns its wheels by a command of the document, or more commands wait.
+    /// Whether a command of the document turns its wheels, or more commands wait.
     pub(crate) fn is_commanded(&self) -> bool {
         self.turns_wheels || !self.commands.is_empty() || self.is_picked
     }
 
-    /// Whatever waits to be told it was given before the station was held up; whether there was
-    /// anything.
+    /// The station was held up, so the commands that wait are old: drops them. Returns whether
+    /// there were any.
     pub(crate) fn forget_commands(&mut self) -> bool {
         let waited = !self.commands.is_empty() || self.is_picked;
         self.drop_commands();
         waited
     }
 
-    /// Whoever gave commands gives no more: none of them waits any longer, and the robot stands
-    /// where one of them turns its wheels.
+    /// The person or GaG that gave the commands has gone: drops the commands that wait, and makes
+    /// the robot stand if one of them turns its wheels.
     pub(crate) fn end_commands(&mut self) -> Option<StationLine> {
         self.drop_commands();
         let turns = core::mem::take(&mut self.turns_wheels);
-        // It asks for commands, or none was given.
+        // The robot asks for commands, or nobody has given one.
         turns.then(|| self.command(OperatorCommand::Stop).ok())??
     }
 
@@ -494,7 +509,7 @@ impl Robot {
         self.is_picked = false;
     }
 
-    /// It is told this command.
+    /// Tells the robot this command.
     fn told_command(&mut self, command: OperatorCommand) {
         self.turns_wheels = match command {
             OperatorCommand::Stop => false,
@@ -503,7 +518,7 @@ impl Robot {
         };
     }
 
-    /// The answer to the question that is held, if it can be given now.
+    /// The answer to the open question, if the station can give it now.
     fn answer(&mut self) -> Option<StationLine> {
         let query = self.held.get()?;
         if self.has_gag && !matches!(query, Query::Arm | Query::Wheels) {

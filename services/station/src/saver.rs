@@ -1,17 +1,21 @@
-//! Saves warehouse and queues in its own thread, because a disk may take seconds and a robot's stop
-//! must not wait for it. What the disk does not take is tried again until it does.
+//! Saves warehouse and queues in a thread of its own. A disk may take seconds, and the stop of a
+//! robot must not wait for it. If the disk refuses a file, the thread tries again until it is
+//! saved.
 
+use lager_plant::Warehouse;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{JoinHandle, spawn};
 use std::time::Duration;
 
+use lager_orders::Reason;
+
 use crate::awaited::Saved;
 use crate::handle::Handle;
 use crate::queues::Queues;
-use crate::warehouse::{SaveError, Warehouse, save};
+use crate::warehouse::{SaveError, save};
 
-/// When what could not be saved is tried again.
+/// How long the thread waits before it tries again.
 const AGAIN: Duration = Duration::from_secs(2);
 
 /// What has changed.
@@ -19,7 +23,7 @@ const AGAIN: Duration = Duration::from_secs(2);
 pub(crate) struct Changes {
     pub(crate) warehouse: Option<Warehouse>,
     pub(crate) queues: Option<Queues>,
-    /// Who waits for the warehouse.
+    /// Those who wait until the warehouse is saved.
     pub(crate) waits: Vec<Saved>,
 }
 
@@ -28,22 +32,22 @@ impl Changes {
         self.warehouse.is_none() && self.queues.is_none()
     }
 
-    /// Of each only the last one counts.
+    /// Only the last change of each counts.
     fn add(&mut self, newer: Self) {
         self.warehouse = newer.warehouse.or(self.warehouse.take());
         self.queues = newer.queues.or(self.queues.take());
         self.waits.extend(newer.waits);
     }
 
-    /// Saves warehouse and queues and tells who waits; where there is no path nothing is saved. What the disk has
-    /// not taken stays, and why is returned.
+    /// Saves warehouse and queues and tells those who wait; without a path it saves nothing. Keeps
+    /// what the disk refuses, and returns why.
     fn save(&mut self, [path, queues]: [Option<&Path>; 2]) -> Vec<SaveError> {
         let mut errors = Vec::new();
         let saved = path.zip(self.warehouse.as_ref());
         let saved = saved.map(|(path, warehouse)| save(path, warehouse));
         let told = match saved {
             Some(Err(error)) => {
-                let why = error.to_string();
+                let why = Reason::from(&error);
                 errors.push(error);
                 Err(why)
             }
@@ -53,7 +57,7 @@ impl Changes {
             }
         };
         for to in self.waits.drain(..) {
-            // Whoever has asked may have given up.
+            // The thread that asked may have given up.
             let _ = to.try_send(told.clone());
         }
         let saved = queues.zip(self.queues.as_ref());
@@ -65,7 +69,7 @@ impl Changes {
     }
 }
 
-/// Saves what changes, until nothing more can.
+/// Saves changes until no more can come.
 fn work(paths: [Option<&Path>; 2], changes: &Receiver<Changes>, handle: &Handle) {
     let mut open = Changes::default();
     let mut has_ended = false;
@@ -79,16 +83,16 @@ fn work(paths: [Option<&Path>; 2], changes: &Receiver<Changes>, handle: &Handle)
         received.into_iter().for_each(|newer| open.add(newer));
         changes.try_iter().for_each(|newer| open.add(newer));
         for error in open.save(paths) {
-            // Who was told of it once knows.
+            // Whoever heard of this error needs to hear it once only.
             if is_new {
-                tracing::error!("{error}; it is tried again");
+                tracing::error!("{error}; the station tries again");
                 handle.change(|station| station.not_saved(&error.to_string()));
             }
         }
     }
 }
 
-/// The thread. When it is dropped everything has been saved, as far as the disk takes it.
+/// The thread. Dropping it waits until everything is saved, or until the disk has refused it.
 #[derive(Debug)]
 pub(crate) struct Saver {
     changes: Option<Sender<Changes>>,
@@ -96,7 +100,7 @@ pub(crate) struct Saver {
 }
 
 impl Saver {
-    /// Saves to these files from now on; nothing where there is none.
+    /// Saves to these files from now on; `None` saves nothing.
     pub(crate) fn new(warehouse: Option<PathBuf>, queues: Option<PathBuf>, handle: Handle) -> Self {
         let (sender, changes) = channel();
         Self {
@@ -107,12 +111,12 @@ impl Saver {
         }
     }
 
-    /// Has what has changed saved.
+    /// Saves a change.
     pub(crate) fn save(&self, changes: Changes) {
         if let Some(to) = &self.changes
             && !changes.is_nothing()
         {
-            // It ends only when this is dropped.
+            // The thread ends only when this is dropped.
             let _ = to.send(changes);
         }
     }

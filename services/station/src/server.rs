@@ -1,17 +1,17 @@
-//! The sockets: robots by TCP, one GaG by a unix socket of this user alone, in one thread that
-//! waits for all of them.
+//! The sockets: TCP for robots, and a unix socket of this user for one GaG. One thread waits for
+//! all of them.
 //!
-//! - Who connects waits until he has said who he is, and proved it where the station knows secrets
-//!   (`waiting.rs`, `gate.rs`); then he gets one of the robots' places (`station/links.rs`). A GaG
-//!   is closed at once while there is another one.
-//! - Where this process or the machine has no open file left, the newcomers wait in the system's
-//!   queue, and this thread does not turn meanwhile.
-//! - A peer that is too slow is closed (`connection.rs`). A peer that is gone without a word is
-//!   found by the kernel: it probes every silent peer after 5 s, and gives one up that has not
-//!   answered for 10 s, or has not confirmed for 10 s what it was sent.
-//! - Each connection reads at most 4 KiB a turn.
-//! - What waits when this thread was held up for more than 200 ms counts as old by as much, until
-//!   there is nothing more of it.
+//! - A new peer waits until it has said its name, and has proved it if the station has secrets
+//!   (`waiting.rs`, `gate.rs`). Then it gets one of the places for robots (`station/links.rs`). The
+//!   server closes a second GaG at once.
+//! - When the system can open no more files, new peers wait in the system's queue, and this thread
+//!   sleeps meanwhile.
+//! - The server closes a peer that is too slow (`connection.rs`). The kernel finds a peer whose
+//!   machine has vanished: it probes each silent peer after 5 s. It gives the peer up when the peer
+//!   does not answer for 10 s, or does not confirm the server's bytes for 10 s.
+//! - Each connection reads at most 4 KiB in one turn.
+//! - If this thread was held up for more than 200 ms, it counts all bytes that wait as old by that
+//!   time.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -25,10 +25,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use lager_floor::ProductId;
 use lager_lines::conversation::RobotLine;
 use lager_lines::secret::{Nonce, Secrets};
 use lager_lines::splitter::LineError;
-use lager_lines::{Called, LATEST_MOVE, Name, ProductId, UnknownProduct, to_line};
+use lager_lines::{Called, Name, UnknownProduct, to_line};
+use lager_orders::lease::LATEST_MOVE;
+use lager_plant::Warehouse;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt;
 
@@ -41,16 +44,16 @@ use crate::queues::Queues;
 use crate::saver::{Changes, Saver};
 use crate::station::{Output, Peer, Station};
 use crate::waiting::Waiting;
-use crate::warehouse::{LoadError, Warehouse, load};
+use crate::warehouse::{LoadError, find, load};
 
-/// How often slow peers and the wish to end are looked for when nothing happens.
+/// How often the thread looks for slow peers and for its end when nothing happens.
 const GLANCE: Duration = Duration::from_millis(50);
-/// How long nobody is let in after the system had no file to open for him.
+/// How long the station accepts nobody after the system could open no more files.
 const REST: Duration = Duration::from_millis(250);
-/// When the kernel begins to ask a silent peer whether it is there, and how often.
+/// After how long the kernel first probes a silent peer, and how often.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 const KEEP_ALIVE_AGAIN: Duration = Duration::from_secs(2);
-/// When the kernel gives up a peer that does not confirm, in ms.
+/// After how many ms the kernel gives up a peer that does not confirm.
 const UNCONFIRMED_MS: u32 = 10_000;
 
 /// The station with its sockets.
@@ -61,9 +64,9 @@ pub struct Server {
     wakes: UnixStream,
     handle: Handle,
     saver: Saver,
-    /// The warehouse's file is this station's as long as it saves in it: dropped after the saver.
+    /// Only this station saves in the warehouse's file. Dropped after the saver.
     _hold: Option<Hold>,
-    /// The queues as they are saved.
+    /// The queues as they were saved last.
     saved: Queues,
     secrets: Secrets,
     connections: BTreeMap<Peer, Connection>,
@@ -71,13 +74,13 @@ pub struct Server {
     waiting: Waiting,
     next_link: u64,
     turned: Turned,
-    /// How long this thread was held up before this turn, if that makes old what waits.
+    /// How long this thread was held up before this turn, if that makes waiting bytes old.
     pause: Option<Duration>,
-    /// Until when nobody is let in, where the system has no file to open for him; it has been said.
+    /// Until when the station accepts nobody, because the system can open no more files.
     rests: Option<Instant>,
 }
 
-/// What is done at each turn of the loop.
+/// Called at each turn of the loop.
 struct Turned(Box<dyn FnMut() + Send>);
 
 impl fmt::Debug for Turned {
@@ -87,11 +90,11 @@ impl fmt::Debug for Turned {
 }
 
 impl Server {
-    /// Opens the sockets and reads the warehouse. Who connects waits until [`Server::run`].
+    /// Opens the sockets and reads the warehouse. New peers wait until [`Server::run`].
     ///
     /// # Errors
     ///
-    /// When a socket cannot be had or the warehouse cannot be.
+    /// The machine refuses a socket, or such a warehouse cannot exist.
     pub fn open(config: ServerConfig) -> Result<Self, ServerError> {
         let hold = match &config.warehouse {
             Some(warehouse) => Hold::of(warehouse)?,
@@ -108,7 +111,7 @@ impl Server {
             let product = match (called, station.warehouse()) {
                 (Called::Number(product), _) => product,
                 (called, Some(warehouse)) => {
-                    let found = warehouse.find(&called);
+                    let found = find(warehouse, &called);
                     found.map_err(|why| ServerError::Called {
                         robot: robot.clone(),
                         why,
@@ -118,7 +121,7 @@ impl Server {
             };
             let waits = saved.0.get(robot.as_str());
             if waits.is_some_and(|waits| waits.contains(&product.get())) {
-                // It was asked for at an earlier start, and waits still.
+                // The product was ordered at an earlier start and still waits.
                 continue;
             }
             let put = station.fetch(&robot, product);
@@ -166,17 +169,17 @@ impl Server {
     ///
     /// # Errors
     ///
-    /// When the machine does not say.
+    /// The machine does not say it.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.robots.local_addr()
     }
 
-    /// What other threads use.
+    /// The station for other threads.
     pub fn handle(&self) -> Handle {
         self.handle.clone()
     }
 
-    /// Has `act` done at each turn, at least ten times a second: a sign that the station goes on.
+    /// Calls `act` at each turn, at least ten times a second. It shows that the station goes on.
     pub fn each_turn(&mut self, act: impl FnMut() + Send + 'static) {
         self.turned = Turned(Box::new(act));
     }
@@ -185,7 +188,7 @@ impl Server {
     ///
     /// # Errors
     ///
-    /// When the machine does not let it wait for its sockets.
+    /// The machine does not let the station wait for its sockets.
     pub fn run(mut self, shutdown: &AtomicBool) -> Result<(), ServerError> {
         let mut turned = Instant::now();
         while !shutdown.load(Ordering::SeqCst) {
@@ -222,7 +225,7 @@ impl Server {
         Ok(())
     }
 
-    /// Has what has changed saved.
+    /// Saves the changes.
     fn save(&mut self) {
         let (warehouse, waits) = self.handle.unsaved();
         let queues = self.handle.look(Station::queues);
@@ -274,10 +277,10 @@ impl Server {
         Ok(ready)
     }
 
-    /// Lets in who has connected.
+    /// Accepts new peers.
     fn let_in(&mut self, now: Instant) {
         let mut failed = None;
-        // Whoever comes faster than that waits for the next turn, as robots do that speak.
+        // Further peers wait for the next turn, as do the robots that speak.
         for _ in 0..Waiting::MOST {
             match self.robots.accept() {
                 Ok((stream, from)) => match prepare(&stream) {
@@ -296,7 +299,7 @@ impl Server {
                 Err(error) => failed = failed.filter(is_short).or(Some(error)),
             }
         }
-        // Whoever waits stays in the system's queue; to ask for him at once would be in vain.
+        // The peer stays in the system's queue; a new attempt at once would fail, too.
         let Some(error) = failed.filter(is_short) else {
             self.rests = None;
             return;
@@ -309,7 +312,7 @@ impl Server {
         }
     }
 
-    /// A new connection; what waits there may have come while this thread was held up.
+    /// Adds a connection. Its bytes may have come while this thread was held up.
     fn opened(&self, now: Instant, stream: Stream) -> Connection {
         let mut connection = Connection::new(stream, now);
         if let Some(pause) = self.pause {
@@ -354,7 +357,7 @@ impl Server {
         self.read(now, peer);
     }
 
-    /// Reads what a peer has said, without a look at what it has read.
+    /// Reads the lines that a peer has sent, without checking what the peer has read.
     fn read(&mut self, now: Instant, peer: Peer) {
         let Some(connection) = self.connections.get_mut(&peer) else {
             return;
@@ -379,7 +382,7 @@ impl Server {
         }
     }
 
-    /// Does what the station wants done to connections.
+    /// Sends and closes what the station wants.
     fn say(&mut self, now: Instant) {
         loop {
             let outputs = self.handle.take(Station::outputs);
@@ -389,7 +392,7 @@ impl Server {
             for output in outputs {
                 match output {
                     Output::Say { to, line } => {
-                        // What waits there was said before this.
+                        // The bytes that wait there came before this.
                         if to == Peer::Gag {
                             self.read(now, to);
                         }
@@ -407,7 +410,7 @@ impl Server {
         }
     }
 
-    /// Looks what the GaG has read, where somebody waits to learn it.
+    /// Finds out what the GaG has read, if the station needs to know it.
     fn watch_gag(&mut self) {
         if let Some(gag) = self.connections.get(&Peer::Gag)
             && self.handle.look(Station::watches_gag)
@@ -431,7 +434,7 @@ impl Server {
             self.end(peer, why);
         }
         for link in self.waiting.overdue(now) {
-            self.end(Peer::Robot(link), "it has not said who it is");
+            self.end(Peer::Robot(link), "it has not said its name");
         }
     }
 
@@ -455,14 +458,14 @@ impl Drop for Server {
     }
 }
 
-/// Who has something to read or takes something.
+/// The connections that can be read or written now.
 #[derive(Debug, Default)]
 struct Ready {
     read: Vec<Peer>,
     write: Vec<Peer>,
 }
 
-/// Hears a line of a robot, as far as its gate lets it pass.
+/// Passes a robot's line to the station, if its gate lets the line through.
 fn hear_robot(
     handle: &Handle,
     secrets: &Secrets,
@@ -492,7 +495,7 @@ fn hear_robot(
     });
 }
 
-/// Whether this process or the machine has no file left to open.
+/// Whether this process or the machine can open no more files.
 fn is_short(error: &io::Error) -> bool {
     use rustix::io::Errno;
     let short = [Errno::MFILE, Errno::NFILE, Errno::NOBUFS, Errno::NOMEM];
@@ -501,7 +504,7 @@ fn is_short(error: &io::Error) -> bool {
         .is_some_and(|raw| short.contains(&Errno::from_raw_os_error(raw)))
 }
 
-/// Nothing has a name before there is a warehouse.
+/// The answer before there is a warehouse: no product has a name.
 fn no_warehouse(robot: Name, called: Called) -> ServerError {
     let known = "none, since it is not known yet".to_owned();
     let why = UnknownProduct { called, known };
@@ -510,7 +513,7 @@ fn no_warehouse(robot: Name, called: Called) -> ServerError {
 
 fn prepare(stream: &TcpStream) -> io::Result<()> {
     stream.set_nonblocking(true)?;
-    // A command is one small packet that waits for nothing.
+    // A command is one small packet; the kernel must not wait for more.
     stream.set_nodelay(true)?;
     sockopt::set_socket_keepalive(stream, true)?;
     sockopt::set_tcp_keepidle(stream, KEEP_ALIVE)?;
@@ -519,7 +522,7 @@ fn prepare(stream: &TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// Has robots fetch what waited for them when the queues were saved.
+/// Fills the robots' queues with the products that waited when the queues were saved.
 fn put_back(station: &mut Station, queues: &Queues) {
     for (name, products) in &queues.0 {
         for product in products {
@@ -548,7 +551,7 @@ fn read(path: Option<&Path>) -> Result<Option<Warehouse>, LoadError> {
     }
 }
 
-/// A socket for this user alone. One that a killed station has left is taken away.
+/// A socket for this user alone. Removes the socket of a station that was killed.
 fn listen_for_gag(path: &Path) -> Result<UnixListener, ServerError> {
     let failed = |error| ServerError::Gag {
         path: path.to_owned(),
@@ -565,7 +568,7 @@ fn listen_for_gag(path: &Path) -> Result<UnixListener, ServerError> {
         fs::remove_file(path).map_err(failed)?;
     }
     let listener = UnixListener::bind(path).map_err(failed)?;
-    // A process of another user that connected first is refused when it is let in.
+    // If a process of another user connects before that, `let_in` refuses it.
     fs::set_permissions(path, fs::Permissions::from_mode(0o600)).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     Ok(listener)

@@ -1,14 +1,16 @@
-//! What a robot that speaks the extension shows of itself, and what it answers.
+//! The state that a robot tells by the extension, and the robot's answers.
 
 use std::time::Duration;
 
+use lager_floor::{Node, Place, ProductId};
+use lager_lines::Text;
 use lager_lines::extension::{
-    Block, Edge, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
+    Block, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
 };
-use lager_lines::{Coord, ProductId, Text};
+use lager_orders::Reason;
 use lager_wire::LineReading;
 
-/// A value that a robot has told, and when.
+/// Something that a robot has told, and when.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seen<T> {
     /// What was told.
@@ -24,81 +26,84 @@ impl<T> Seen<T> {
     }
 }
 
-/// The last of each kind that a robot has shown. It stays when the robot has gone, and grows old.
+/// The last state of each kind that a robot has told. When the robot has gone, it stays and grows
+/// old.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
     /// What it is doing, twenty times a second.
     pub state: Option<Seen<State>>,
-    /// Where a simulated one really is.
+    /// Where a simulated robot really is.
     pub truth: Option<Seen<TruePose>>,
-    /// The nodes of its way. Of this and what follows only changes are told.
-    pub route: Option<Seen<Listed<Coord>>>,
-    /// The ways that it does not take.
+    /// The nodes of its way. The robot tells this and the following only when they change.
+    pub route: Option<Seen<Listed<Node>>>,
+    /// The ways that it avoids.
     pub blocked: Option<Seen<Listed<Block>>>,
-    /// What it fetches next by itself, after what it is on.
+    /// The products that it fetches next by itself, after the present one.
     pub queue: Option<Seen<Listed<Queued>>>,
-    /// What stands on ways of its simulated world.
-    pub obstacles: Option<Seen<Listed<Edge>>>,
+    /// The things that stand on ways of its simulated world.
+    pub obstacles: Option<Seen<Listed<Place>>>,
     /// The products whose goods are not in their place.
     pub gone: Option<Seen<Listed<ProductId>>>,
     /// How long it takes to react, about once a second.
     pub latency: Option<Seen<Box<Latency>>>,
-    /// What each line sensor has read in the last calibration, the leftmost first.
+    /// What each line sensor read in the last calibration, the leftmost first.
     pub sensors: Option<Seen<[LineReading; 11]>>,
 }
 
-/// What has become of an action or of a stop.
+/// What became of an action or of a stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
-    /// It is done.
+    /// The robot has done it.
     Done,
-    /// The steering board shows both motors off under the stop.
+    /// The robot is stopped, and the steering board shows both motors off.
     Stopped {
-        /// How long that took from its receipt, in ms.
+        /// How long that took after the robot got the stop, in ms.
         after_ms: u32,
     },
-    /// It is not done.
-    Refused(Text),
+    /// The robot has not done it.
+    Refused(Reason),
     /// Nobody knows: the connection has ended, or the robot does not answer.
     Lost,
 }
 
-/// What a robot has just said.
+/// Something that a robot has just said.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Told {
-    /// Something has happened on a mission.
+pub enum Saying {
+    /// Something happened on a mission.
     Event(Event),
-    /// The thought that comes next, in values.
+    /// The values of the thought that comes next.
     Thinks(Box<Thinks>),
-    /// It has thought something.
+    /// The reason of the thought that comes next.
+    Because(Reason),
+    /// A thought as a sentence.
     Thought(Text),
-    /// One of these, so long before it was told.
+    /// One of these that happened earlier than the robot told it.
     Past {
-        /// How long, by the robot's clock.
+        /// How much earlier, by the robot's clock.
         ago: Duration,
-        /// What.
-        told: Box<Told>,
+        /// What happened.
+        told: Box<Saying>,
     },
-    /// Somebody here has asked something of it, which is under way.
+    /// Somebody here has asked the robot for something, and waits for the answer.
     Asked {
-        /// Who, as the station calls him.
+        /// The name by which the station knows this person.
         by: String,
-        /// What: the words of an action, `stop`, `take` or `free`.
+        /// The wish: the words of an action, `stop`, `take` or `free`.
         what: String,
     },
-    /// It has answered the action or the stop with this number.
+    /// The robot has answered the action or the stop with this number.
     Replied {
         /// The number.
         number: u32,
-        /// What has become of it.
+        /// The answer.
         reply: Reply,
     },
 }
 
 impl Shown {
-    /// Takes what a robot has told at this moment; what only passes by is handed back.
-    pub(crate) fn take(&mut self, report: Report, at: Duration) -> Option<Told> {
-        let replied = |number, reply| Some(Told::Replied { number, reply });
+    /// Keeps a state that the robot tells at this moment. Returns news, which nobody keeps here.
+    pub(crate) fn take(&mut self, report: Report, at: Duration) -> Option<Saying> {
+        let replied = |number, reply| Some(Saying::Replied { number, reply });
         match report {
             Report::State(state) => self.state = Some(Seen { value: *state, at }),
             Report::Truth(value) => self.truth = Some(Seen { value, at }),
@@ -112,10 +117,11 @@ impl Shown {
             Report::Past { ago_ms, report } => {
                 let ago = Duration::from_millis(ago_ms);
                 let told = Box::new(self.take(*report, at)?);
-                return Some(Told::Past { ago, told });
+                return Some(Saying::Past { ago, told });
             }
-            Report::Event(event) => return Some(Told::Event(event)),
-            Report::Thinks(thinks) => return Some(Told::Thinks(thinks)),
+            Report::Event(event) => return Some(Saying::Event(event)),
+            Report::Thinks(thinks) => return Some(Saying::Thinks(thinks)),
+            Report::Because(reason) => return Some(Saying::Because(reason)),
             Report::Done { number } => return replied(number, Reply::Done),
             Report::Refused { number, reason } => return replied(number, Reply::Refused(reason)),
             Report::Stopped { number, after_ms } => {

@@ -2,77 +2,81 @@
 //!
 //! ```text
 //!   a connection's first line         its robot is called
-//!   lager 1 <name> [<ms>]             by that name; it is answered `lager 1 <station> [<ms>]`
+//!   lager 1 <name> [<ms>]             by that name; the answer is `lager 1 <station> [<ms>]`
 //!   anything else of a robot          robot-1, robot-2 ..., the first that is free
 //! ```
 //!
-//! - A name has one connection, and there are so many places (`station/links.rs`). Whether a robot
-//!   has proved its name is found out before its lines come here (`gate.rs`).
-//! - A line that breaks the grammar closes its connection; no part of it counts.
-//! - A GaG's language has no names of robots, so it speaks for one: the one that has been connected
-//!   for longest. The others are answered from the warehouse and their queues.
-//! - What a GaG says moves no robot when it may have waited for more than 200 ms, or may have been
-//!   meant for the robot for which the GaG spoke before. One that reads nothing drives nobody on.
-//! - A GaG's answers are checked as a file is. The station refuses an impossible answer in a
-//!   `thought` and asks again. It takes over what a GaG says of the warehouse.
+//! - A name has one connection, and the number of connections is limited (`station/links.rs`). A
+//!   robot has proved its name before its lines come here (`gate.rs`).
+//! - A line that breaks the grammar closes its connection; the station ignores the whole line.
+//! - A GaG's language has no names of robots. So a GaG speaks for one robot: the one that has been
+//!   connected for the longest time. The station answers the others itself, from the warehouse and
+//!   their queues.
+//! - The station refuses a GaG's command that may be older than 200 ms, and one that may be meant
+//!   for the robot for which the GaG spoke before. A robot stands when the GaG that drives it stops
+//!   reading.
+//! - The station checks a GaG's answers as it checks a file. It refuses an impossible answer with a
+//!   `thought`, and asks again. It takes over what a GaG says of the warehouse.
+//! - A person who drives a robot by actions (`station/actions.rs`) drives alone: neither a GaG nor
+//!   another person moves the robot then. Anybody may stop it.
 //!
-//! - A person drives a robot that speaks the extension by actions (`station/actions.rs`); meanwhile
-//!   neither a GaG nor anybody else here moves it, but anybody stops it.
-//!
-//! It is pure: time, lines and wishes in, [`Output`]s out, in the order in which they came about.
+//! It is pure: time, lines and wishes in, [`Output`]s out, in their order.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use lager_floor::{Grid, ProductId, SideLength};
 use lager_lines::conversation::{Held, RobotLine, StationLine};
 use lager_lines::extension::{Hello, Order};
 use lager_lines::gag::Request;
 use lager_lines::splitter::LineError;
-use lager_lines::{Map, Name, ProductId, Products, SideLength, to_line};
+use lager_lines::{Name, Products, to_line};
+use lager_orders::{Code, Reason};
+use lager_plant::Warehouse;
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
 use crate::queues::Queues;
 use crate::robot::{ActRefused, CommandRefused, FetchRefused, Robot};
-use crate::warehouse::{Warehouse, WarehouseError};
+use crate::warehouse;
 
 mod actions;
 mod gag;
 mod links;
-mod told;
+mod uses;
 
 use links::{Known, Link};
 
-pub use actions::News;
-pub use told::Uses;
+pub use actions::RobotSaid;
+pub use uses::Uses;
 
-/// Who is at the other end of a connection.
+/// The peer at the other end of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Peer {
-    /// A robot, by the number of its connection; numbers grow and are never used again.
+    /// A robot, by the number of its connection. Numbers grow and never come twice.
     Robot(u64),
     /// The GaG.
     Gag,
 }
 
-/// What is to be done to a connection.
+/// What the sockets have to do with a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Output {
-    /// A line with its end is said.
+    /// Write this line and its end.
     Say {
         /// To whom.
         to: Peer,
         /// What.
         line: String,
     },
-    /// The same, before all lines that wait to be said: a stop.
+    /// Write this line before all lines that wait, because it is a stop.
     SayFirst {
         /// To whom.
         to: Peer,
         /// What.
         line: String,
     },
-    /// It is closed.
+    /// Close it.
     Close {
         /// Whose.
         peer: Peer,
@@ -81,37 +85,45 @@ pub enum Output {
     },
 }
 
-/// What a person wants of a robot.
+/// A person's wish for a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wish {
-    /// Have a product fetched after those that wait.
+    /// Fetch a product, after those that wait.
     Fetch(ProductId),
-    /// Have a product that waits not fetched.
+    /// Do not fetch a product that waits.
     Cancel(ProductId),
     /// Give a command.
     Command(OperatorCommand),
-    /// Tell it that the goods are in the gripper.
+    /// Tell the robot that the goods are in the gripper.
     PickedUp,
 }
 
-/// Why a wish is not fulfilled.
+/// Why the station refuses a wish.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}", Reason::from(self))]
 pub enum WishRefused {
     /// There is no such robot.
-    #[error("there is no robot {0} here; it connects by itself once it is up")]
     NoRobot(Name),
-    /// The command is not given.
-    #[error(transparent)]
+    /// The robot does not get the command.
     Command(#[from] CommandRefused),
-    /// The action is not given.
-    #[error(transparent)]
+    /// The robot does not get the action.
     Act(#[from] ActRefused),
-    /// The product is not fetched.
-    #[error(transparent)]
+    /// The robot does not get the product into its queue.
     Fetch(#[from] FetchRefused),
-    /// The product does not wait.
-    #[error("product {0} does not wait to be fetched")]
+    /// The product does not wait in the queue.
     NotQueued(ProductId),
+}
+
+impl From<&WishRefused> for Reason {
+    fn from(why: &WishRefused) -> Self {
+        match why {
+            WishRefused::NoRobot(robot) => Self::new(Code::NoRobot, &[robot]),
+            WishRefused::Command(why) => (*why).into(),
+            WishRefused::Act(why) => why.into(),
+            WishRefused::Fetch(why) => why.into(),
+            WishRefused::NotQueued(product) => Self::new(Code::NotQueued, &[product]),
+        }
+    }
 }
 
 /// The external computer.
@@ -122,7 +134,7 @@ pub struct Station {
     robots: BTreeMap<Name, Robot>,
     /// The connections of robots, the oldest first.
     links: BTreeMap<u64, Link>,
-    /// The names that are known.
+    /// The names that the station knows.
     known: BTreeMap<Name, Known>,
     gag: Option<Gag>,
     outputs: Vec<Output>,
@@ -133,38 +145,38 @@ pub struct Station {
 /// The GaG that is connected.
 #[derive(Clone, Debug, Default)]
 struct Gag {
-    /// What it has been asked and has not answered.
+    /// The question that the station has asked it, until it answers.
     held: Held,
     /// The robot it speaks for.
     robot: Option<Name>,
     /// That robot's connection.
     link: Option<u64>,
-    /// What it says may still be meant for this robot, for which it spoke before.
+    /// The robot for which it spoke before; its next line may still be meant for that one.
     may_mean: Option<Name>,
-    /// It has been told something since it speaks for another one.
+    /// The station has told it something since it speaks for another robot.
     is_told: bool,
-    /// Since when it has not read all that it has been told, by the station's clock.
+    /// Since when lines wait that it has not read, by the station's clock.
     unread: Option<Duration>,
-    /// When it was told something last.
+    /// When the station told it something last.
     told: Duration,
     side: Option<SideLength>,
-    map: Option<Map>,
+    map: Option<Grid>,
     products: Option<Products>,
 }
 
 impl Station {
-    /// Robots that are remembered, at most. Of those that are away the ones without a queue are
-    /// forgotten first.
+    /// How many robots the station remembers. Robots that are away and have no queue are forgotten
+    /// first.
     pub const MOST_ROBOTS: usize = 64;
 
     /// An external computer that calls itself `name`.
     ///
     /// # Errors
     ///
-    /// When there can be no such warehouse.
-    pub fn new(name: Name, warehouse: Option<Warehouse>) -> Result<Self, WarehouseError> {
+    /// Such a warehouse cannot exist.
+    pub fn new(name: Name, warehouse: Option<Warehouse>) -> Result<Self, Reason> {
         if let Some(warehouse) = &warehouse {
-            warehouse.check()?;
+            warehouse::told(warehouse)?;
         }
         Ok(Self {
             name,
@@ -179,17 +191,17 @@ impl Station {
         })
     }
 
-    /// What is to be done, oldest first; it is then no longer here.
+    /// Takes what the sockets have to do, the oldest first.
     pub fn outputs(&mut self) -> Vec<Output> {
         core::mem::take(&mut self.outputs)
     }
 
-    /// Whether something is to be done.
+    /// Whether the sockets have something to do.
     pub(crate) fn has_outputs(&self) -> bool {
         !self.outputs.is_empty()
     }
 
-    /// The robots that are known, connected or not.
+    /// All robots that the station knows, connected or not.
     pub fn robots(&self) -> impl Iterator<Item = (&Name, &Robot)> {
         self.robots.iter()
     }
@@ -204,18 +216,18 @@ impl Station {
         self.gag.is_some()
     }
 
-    /// The warehouse, once it is known.
+    /// The warehouse, once the station knows it.
     pub const fn warehouse(&self) -> Option<&Warehouse> {
         self.warehouse.as_ref()
     }
 
-    /// The warehouse is another one now; robots that wait for it are told.
+    /// Sets another warehouse, and answers robots that wait for it.
     ///
     /// # Errors
     ///
-    /// When there can be no such warehouse; the one before is kept.
-    pub fn set_warehouse(&mut self, warehouse: Warehouse) -> Result<(), WarehouseError> {
-        warehouse.check()?;
+    /// Such a warehouse cannot exist. The one before stays.
+    pub fn set_warehouse(&mut self, warehouse: Warehouse) -> Result<(), Reason> {
+        warehouse::told(&warehouse)?;
         let names: Vec<Name> = self.robots.keys().cloned().collect();
         for name in names {
             let robot = self.robots.get_mut(&name).expect("a name of the list");
@@ -227,14 +239,14 @@ impl Station {
         Ok(())
     }
 
-    /// The warehouse, if it is another one than when this was asked last and is to be saved.
+    /// The warehouse, if it has changed since the last call and must be saved.
     pub fn unsaved(&mut self) -> Option<Warehouse> {
         core::mem::take(&mut self.is_unsaved)
             .then(|| self.warehouse.clone())
             .flatten()
     }
 
-    /// What waits to be fetched, to be saved.
+    /// The products that wait, for the file.
     pub fn queues(&self) -> Queues {
         let waits = |robot: &Robot| robot.unfetched().map(ProductId::get).collect::<Vec<_>>();
         let queues = self.robots.iter();
@@ -242,16 +254,16 @@ impl Station {
         Queues(queues.filter(|(_, waits)| !waits.is_empty()).collect())
     }
 
-    /// Has a product fetched by a robot that need not have connected yet.
+    /// Puts a product in the queue of a robot that may not have connected yet.
     ///
     /// # Errors
     ///
-    /// When the warehouse does not have it or too many wait.
+    /// The warehouse has no such product, or too many wait.
     pub fn fetch(&mut self, name: &Name, product: ProductId) -> Result<(), WishRefused> {
         if !self.robots.contains_key(name) {
             let mut robot = Robot::default();
             if let Some(warehouse) = &self.warehouse {
-                // It has been checked, and nothing is asked yet.
+                // The name has been checked, and the robot has asked nothing yet.
                 let _ = robot.set_warehouse(warehouse);
             }
             robot.fetch(product)?;
@@ -266,7 +278,7 @@ impl Station {
     ///
     /// # Errors
     ///
-    /// When it cannot be done; nothing has changed then.
+    /// The station cannot do it. Nothing has changed then.
     pub fn wish(&mut self, name: &Name, wish: Wish) -> Result<(), WishRefused> {
         let Some(robot) = self.robots.get_mut(name) else {
             return Err(WishRefused::NoRobot(name.clone()));
@@ -327,8 +339,8 @@ impl Station {
         self.heard_late(peer, Duration::ZERO, line);
     }
 
-    /// The same of a line that may have waited for so long before the station read it. A robot
-    /// tells of itself, and that is taken however late it comes.
+    /// The same for a line that may have waited for so long before the station read it. A robot's
+    /// news count, however late they come.
     pub fn heard_late(&mut self, peer: Peer, late: Duration, line: Result<&str, LineError>) {
         let line = match line {
             Ok(line) => line,
@@ -383,9 +395,9 @@ impl Station {
     }
 }
 
-/// What is said.
+/// What the station says.
 impl Station {
-    /// Says a line to a robot, on the connection it has.
+    /// Says a line to a robot, by its connection.
     fn say(&mut self, name: &Name, line: Option<StationLine>) {
         let (Some(line), Some(link)) = (line, self.link_of(name)) else {
             return;
@@ -409,7 +421,7 @@ impl Station {
                 }
                 self.outputs.push(Output::Say { to, line });
             }
-            // Everything that is too long has been refused before; a text of a peer is a line's.
+            // Longer texts have been refused before; a peer's text fits a line.
             Err(error) => self.close(to, error.to_string()),
         }
     }

@@ -1,7 +1,7 @@
-//! Whether the peer of a unix socket has read what it was told.
+//! Whether the peer of a unix socket has read every byte.
 //!
-//! It is apart because it is the one place of the station that needs `unsafe`: the request
-//! `SIOCOUTQ` has no safe wrapper.
+//! This file stands apart because only it needs `unsafe`: the request `SIOCOUTQ` has no safe
+//! wrapper.
 #![allow(unsafe_code)]
 
 use std::ffi::c_int;
@@ -9,11 +9,11 @@ use std::os::fd::AsFd;
 
 use rustix::ioctl::{Getter, Opcode, ioctl};
 
-/// The same number for a terminal, where it has its name from.
+/// A terminal uses the same number under this name.
 const SIOCOUTQ: Opcode = 0x5411;
 
-/// Whether something that was written to this socket is still to be read by its peer. A socket that
-/// does not tell has no peer that could be asked.
+/// Whether the peer has bytes of this socket to read. False if the socket cannot tell, because such
+/// a socket has no peer.
 pub(crate) fn is_unread(socket: impl AsFd) -> bool {
     // SAFETY: SIOCOUTQ writes one `int` to its argument.
     let waits = unsafe { ioctl(socket, Getter::<SIOCOUTQ, c_int>::new()) };

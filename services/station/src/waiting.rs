@@ -1,15 +1,15 @@
-//! Who is connected and has not said yet who he is. Pure.
+//! The peers that have connected and have not said their names yet. Pure.
 //!
-//! A robot says that at once, so the place that waits for its first words is small: of all that
-//! wait there are [`Waiting::MOST`], and each for [`Waiting::LONGEST`]. Whoever comes where all are
-//! taken gets the place of the one that has waited for longest at the address that has most of
-//! them. So nobody keeps others out by saying nothing, and one address keeps out itself alone.
+//! A robot says its name at once. So only [`Waiting::MOST`] peers may wait, each for
+//! [`Waiting::LONGEST`]. When all places are taken, a new peer replaces the oldest one of the
+//! address that has the most peers. So nobody keeps others out by saying nothing, and an address
+//! with many peers harms only itself.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::time::{Duration, Instant};
 
-/// Those that wait, by the numbers of their connections.
+/// The peers that wait, by the numbers of their connections.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Waiting(BTreeMap<u64, Guest>);
 
@@ -20,12 +20,12 @@ struct Guest {
 }
 
 impl Waiting {
-    /// How many wait at a time, at most.
+    /// How many peers may wait at a time.
     pub(crate) const MOST: usize = 32;
-    /// How long one may wait.
+    /// How long a peer may wait.
     pub(crate) const LONGEST: Duration = Duration::from_secs(5);
 
-    /// One more waits; who has to go for that.
+    /// A new peer waits. Returns the peer that it replaces, if any.
     pub(crate) fn comes(&mut self, link: u64, from: IpAddr, now: Instant) -> Option<u64> {
         let goes = (self.0.len() >= Self::MOST).then(|| self.first_of_most());
         let goes = goes.flatten();
@@ -36,19 +36,19 @@ impl Waiting {
         goes
     }
 
-    /// It waits no more.
+    /// A peer does not wait any more.
     pub(crate) fn goes(&mut self, link: u64) {
         self.0.remove(&link);
     }
 
-    /// Who has waited for too long.
+    /// The peers that have waited for too long.
     pub(crate) fn overdue(&self, now: Instant) -> Vec<u64> {
         let is_over = |guest: &Guest| now.saturating_duration_since(guest.since) > Self::LONGEST;
         let over = self.0.iter().filter(|(_, guest)| is_over(guest));
         over.map(|(&link, _)| link).collect()
     }
 
-    /// The first at the address that has most.
+    /// The oldest peer of the address that has the most peers.
     fn first_of_most(&self) -> Option<u64> {
         let count = |from: IpAddr| self.0.values().filter(|guest| guest.from == from).count();
         let most = self

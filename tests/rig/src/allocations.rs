@@ -1,4 +1,4 @@
-//! An allocator that counts, for programs that show that something allocates nothing.
+//! An allocator that counts its calls, for programs that check that some code allocates nothing.
 //!
 //! ```ignore
 //! #[global_allocator]
@@ -10,7 +10,7 @@ use core::cell::Cell;
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::alloc::{GlobalAlloc, Layout, System};
 
-/// The system's allocator, which counts.
+/// The system's allocator, which also counts the allocations.
 #[derive(Clone, Copy, Debug)]
 pub struct Counting;
 
@@ -21,26 +21,26 @@ thread_local! {
     static IS_EXEMPT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// How often all threads have allocated so far, those that are exempt left out.
+/// The number of allocations so far by all threads that are not exempt.
 pub fn of_all_threads() -> u64 {
     OF_ALL.load(Ordering::Relaxed)
 }
 
-/// How often the calling thread allocates while `work` runs.
+/// The number of allocations that the calling thread makes while `work` runs.
 pub fn of(work: impl FnOnce()) -> u64 {
     let before = OF_THIS_THREAD.get();
     work();
     OF_THIS_THREAD.get() - before
 }
 
-/// From now on the calling thread does not count among all threads: it belongs to the test and not
-/// to what is tested.
+/// From now on [`of_all_threads`] does not count the calling thread, because that thread belongs to
+/// the test and not to the tested program.
 pub fn exempt_this_thread() {
     IS_EXEMPT.set(true);
 }
 
 fn count() {
-    // A thread that is just ending has its own count no more, and belongs to nothing tested.
+    // A thread that is ending has already lost its counter. Such a thread is not under test.
     let _ = OF_THIS_THREAD.try_with(|count| count.set(count.get() + 1));
     if !IS_EXEMPT.try_with(Cell::get).unwrap_or(true) {
         OF_ALL.fetch_add(1, Ordering::Relaxed);

@@ -1,8 +1,8 @@
-//! A board as tests and measurements play it: one end of a cable and one end of a link.
+//! A board for tests and measurements: the board's end of a cable and its end of a link.
 //!
-//! It answers handshakes, and knows when it is time to report. All else is the player's.
+//! It answers handshakes and knows when its next report is due. The test does everything else.
 
-use lager_ports::Clock;
+use lager_home::Clock;
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
     Callsign, Payload, ResetCause, Setting, SettingReply, SettingStatus, SteerData, SteerFlags,
@@ -10,23 +10,23 @@ use lager_wire::{
 
 use crate::{Cable, Refused};
 
-/// How long a board waits for the next byte of a packet, in us. The bridge writes packets whole,
-/// but a process that is put to sleep may be cut off in one.
+/// The longest wait for the next byte of a packet, in us. The bridge writes whole packets, but the
+/// kernel may stop a process in the middle of a write.
 pub const GAP_US: u32 = 50_000;
 
-/// Boards speak at least this often, in ns: a link that is silent for a second is down, and nobody
-/// drives a board that has not reported for 200 ms.
+/// The longest time between two reports, in ns. A link that is silent for 1 s is down, and the
+/// robot does not drive with a board that has not reported for 200 ms.
 pub const SPEAK_EVERY_NS: u64 = 100_000_000;
 
-/// One board: its end of the wire and its end of the link.
+/// One board.
 #[derive(Debug)]
 pub struct Board {
-    /// Its end of the wire.
+    /// The board's end of the wire.
     pub cable: Cable,
-    /// Its end of the link.
+    /// The board's end of the link.
     pub link: BoardLink,
-    /// When it last spoke for [`Board::speak`], in ns of `CLOCK_MONOTONIC`; 0 = never, so
-    /// it speaks next time.
+    /// When [`Board::speak`] last sent something, in ns of `CLOCK_MONOTONIC`; 0 = never, so the
+    /// next call sends at once.
     pub spoke_ns: u64,
 }
 
@@ -34,7 +34,7 @@ impl Board {
     /// A board that has just been switched on.
     ///
     /// # Errors
-    /// There is no pseudo terminal to be had.
+    /// The kernel gives no pseudo terminal.
     pub fn new(sign: Callsign) -> Result<Self, Refused> {
         Ok(Self {
             cable: Cable::new()?,
@@ -43,7 +43,7 @@ impl Board {
         })
     }
 
-    /// Takes what has come, hands over each packet's data, and sends a handshake if one is due.
+    /// Reads what came, hands over each packet's data, and sends a handshake if one is due.
     ///
     /// # Errors
     /// As [`Cable::read`] and [`Cable::write`].
@@ -55,7 +55,8 @@ impl Board {
         }
     }
 
-    /// Sends data if the link is up and it has not spoken for [`SPEAK_EVERY_NS`]; whether it was.
+    /// Sends data if the link is up and the last report is [`SPEAK_EVERY_NS`] old. Returns whether
+    /// it did.
     ///
     /// # Errors
     /// As [`Cable::write`].
@@ -80,7 +81,7 @@ impl Board {
         }
     }
 
-    /// Takes what has come, and hands over each packet's data.
+    /// Reads the received bytes, and hands over each packet's data.
     ///
     /// # Errors
     /// As [`Cable::read`].
@@ -95,7 +96,7 @@ impl Board {
         }
     }
 
-    /// Hears bytes that were read from the cable, and hands over each packet's data.
+    /// Decodes bytes that were read from the cable, and hands over each packet's data.
     pub fn hear(&mut self, bytes: &[u8], mut packet: impl FnMut(Payload)) {
         for byte in bytes {
             if let Some(BoardEvent::Packet(heard)) = self.link.push(*byte, board_us()) {
@@ -105,8 +106,8 @@ impl Board {
     }
 }
 
-/// What a steering board reports that does what it is told, but whose wheels are in the air: a flag
-/// besides the duties of 0 says that they are meant.
+/// The report of a steering board that carries out its command with the wheels in the air. It
+/// reports duty 0 while a command to drive is in force, so a flag says that this duty is meant.
 #[must_use]
 pub fn wheels_in_the_air(code: u8) -> Payload {
     Payload::SteerData(SteerData {
@@ -121,7 +122,7 @@ pub fn wheels_in_the_air(code: u8) -> Payload {
     })
 }
 
-/// What a board answers to a setting.
+/// A board's answer to a setting.
 #[must_use]
 pub fn answer_to(setting: &Setting, status: SettingStatus) -> Payload {
     Payload::SettingReply(SettingReply {
@@ -132,7 +133,7 @@ pub fn answer_to(setting: &Setting, status: SettingStatus) -> Payload {
     })
 }
 
-/// A board's clock: microseconds that wrap.
+/// A board's clock: microseconds, which wrap around.
 fn board_us() -> u32 {
     (Clock::monotonic_ns() / 1_000) as u32
 }

@@ -1,11 +1,11 @@
-//! A pseudo terminal in place of a board's USB cable, held at the board's end.
+//! A pseudo terminal in place of a board's USB cable, for a test that plays the board.
 //!
 //! ```text
 //!   board, this process --write--> master ==kernel==> device --> whoever opens it as a serial port
 //!                       <--read---
 //! ```
 //!
-//! Nothing here knows what the bytes mean, and nothing waits without a limit.
+//! Nothing here knows the meaning of the bytes, and every wait has a limit.
 
 use core::time::Duration;
 use std::ffi::OsStr;
@@ -13,7 +13,7 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 
-use lager_ports::Clock;
+use lager_home::Clock;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::io::Errno;
@@ -31,10 +31,10 @@ pub struct Cable {
 }
 
 impl Cable {
-    /// A new pseudo terminal: raw, as a serial line is.
+    /// A new pseudo terminal in raw mode, as a serial line is.
     ///
     /// # Errors
-    /// There is none to be had.
+    /// The kernel gives none.
     pub fn new() -> Result<Self, Refused> {
         open().map_err(Refused::to_make("a pseudo terminal"))
     }
@@ -48,7 +48,7 @@ impl Cable {
     /// Sends `bytes`, all of them.
     ///
     /// # Errors
-    /// Nobody reads at the other end, or the kernel says something else.
+    /// Nobody reads at the other end, or the kernel refuses for another reason.
     pub fn write(&self, bytes: &[u8]) -> Result<(), Refused> {
         match self.write_some(bytes)? {
             count if count == bytes.len() => Ok(()),
@@ -58,11 +58,11 @@ impl Cable {
         }
     }
 
-    /// Sends as many of `bytes` as there is room for; how many that was: 0 also where nobody has
-    /// the other end open.
+    /// Sends as many of `bytes` as there is room for, and returns their number. It is 0 also when
+    /// nobody has opened the other end.
     ///
     /// # Errors
-    /// The kernel says why.
+    /// The kernel refuses.
     pub fn write_some(&self, bytes: &[u8]) -> Result<usize, Refused> {
         match rustix::io::write(&self.master, bytes) {
             Ok(count) => Ok(count),
@@ -71,23 +71,23 @@ impl Cable {
         }
     }
 
-    /// What has come; 0 = nothing.
+    /// Reads the bytes that have come; 0 = none.
     ///
     /// # Errors
-    /// The kernel says why.
+    /// The kernel refuses.
     pub fn read(&self, buffer: &mut [u8]) -> Result<usize, Refused> {
         match rustix::io::read(&self.master, buffer) {
             Ok(count) => Ok(count),
-            // EIO: nobody has opened the other end yet, or nobody has it open any more.
+            // EIO: nobody has the other end open.
             Err(Errno::AGAIN | Errno::INTR | Errno::IO) => Ok(0),
             Err(errno) => Err(broken(&errno.to_string())),
         }
     }
 
-    /// Waits for bytes until `end_ns` of `CLOCK_MONOTONIC` and reads them; 0 = the time is over.
+    /// Waits for bytes until `end_ns` of `CLOCK_MONOTONIC` and reads them; 0 = none came in time.
     ///
     /// # Errors
-    /// The kernel says why.
+    /// The kernel refuses.
     pub fn read_until(&self, end_ns: u64, buffer: &mut [u8]) -> Result<usize, Refused> {
         loop {
             let left = end_ns.saturating_sub(Clock::monotonic_ns());
@@ -103,7 +103,7 @@ impl Cable {
                 return Ok(count);
             }
             if fds[0].revents().contains(PollFlags::HUP) {
-                // Nobody has the other end open: `poll` returns at once, so the wait is here.
+                // Nobody has the other end open, so `poll` returns at once: wait here.
                 std::thread::sleep(Duration::from_millis(1).min(Duration::from_nanos(left)));
                 if left == 0 {
                     return Ok(0);
@@ -137,7 +137,7 @@ impl AsFd for Cable {
     }
 }
 
-/// A duration in ns as the kernel takes it.
+/// A duration in ns as the kernel's type.
 #[must_use]
 pub fn timespec(ns: u64) -> Timespec {
     Timespec {

@@ -1,18 +1,17 @@
-//! A bus of its own for each test and each measurement, which is removed at the end even if
-//! processes on it have died.
-//!
-//! No robot sees anything of it, and none is disturbed.
+//! A separate bus for each test and each measurement. It disturbs no robot on this machine, and it
+//! is removed at the end even if processes on it have died.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use lager_ports::{Bus, BusConfig, Place};
-use lager_topics::Role;
+use lager_home::Home;
+use lager_ports::{Bus, BusConfig};
+use lager_topics::{LAGER, Role};
 
-/// Where the buses lie, beside the segments.
+/// The kernel's folder for shared memory; the buses lie beside the segments.
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// There is no place for a bus.
+/// A folder in which no bus can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{place} cannot be used for a bus of its own ({detail}); check that it exists, is writable and is not full"
@@ -20,15 +19,15 @@ const SHARED_MEMORY: &str = "/dev/shm";
 pub struct NoPlace {
     /// The folder.
     pub place: PathBuf,
-    /// What the kernel says.
+    /// The kernel's reason.
     pub detail: String,
 }
 
-/// The configuration of the bus in `folder`, for a process that was told the folder.
+/// The configuration of the bus in `folder`, for a process that got the folder from its parent.
 pub fn bus_at(folder: impl Into<PathBuf>) -> BusConfig {
     BusConfig {
         folder: Some(folder.into()),
-        ..BusConfig::default()
+        ..BusConfig::of(&LAGER)
     }
 }
 
@@ -41,8 +40,8 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// A new bus, whose folder begins with `family`, at most 15 characters. Also removes what
-    /// programs of that family left behind that were killed themselves.
+    /// A new bus. Its folder's name begins with `family`, at most 15 characters. Also removes the
+    /// buses that killed programs of that family have left.
     ///
     /// # Errors
     /// Its folder cannot be made, or `/dev/shm` cannot be written to.
@@ -55,9 +54,9 @@ impl Domain {
             place: domain.folder.clone(),
             detail,
         };
-        let place = domain.config().place();
+        let place = domain.config().home();
         place.map_err(|error| refused(error.to_string()))?;
-        // The transport would say the same in a dozen ways, later.
+        // Without this check the transport would fail later, with a dozen different messages.
         let probe = domain.folder.join("probe");
         std::fs::write(&probe, [0; 4096])
             .and_then(|()| std::fs::remove_file(&probe))
@@ -91,7 +90,7 @@ impl Domain {
         &self.folder
     }
 
-    /// A folder for files that are not the bus's, on a disk; made when it is first asked for.
+    /// A folder on a disk for files that are not the bus's; the first call makes it.
     ///
     /// # Panics
     /// When it cannot be made.
@@ -101,16 +100,16 @@ impl Domain {
         &self.files
     }
 
-    /// Where the bus lives.
+    /// The bus's place in the file system.
     ///
     /// # Panics
     /// When its folder cannot be used any more.
     #[must_use]
-    pub fn place(&self) -> Place {
-        self.config().place().expect("the bus's folder")
+    pub fn home(&self) -> Home {
+        self.config().home().expect("the bus's folder")
     }
 
-    /// A way onto the bus.
+    /// Opens the bus in this role.
     ///
     /// # Panics
     /// When the bus cannot be opened.
@@ -119,11 +118,11 @@ impl Domain {
         Bus::open(&self.config(), role).expect("the bus opens")
     }
 
-    /// What processes have left, or still have, in shared memory and in the bus's folder.
+    /// The files in shared memory and in the bus's folder that processes use or have left.
     #[must_use]
     pub fn left(&self) -> Vec<PathBuf> {
-        let mut left = self.place().segments();
-        // The transport keeps one small segment for each bus for ever.
+        let mut left = self.home().segments();
+        // The transport never removes one small segment of each bus.
         left.retain(|segment| segment.extension().is_none_or(|end| end != "global_mgmt"));
         let mut folders = vec![self.folder.clone()];
         while let Some(folder) = folders.pop() {
@@ -142,13 +141,13 @@ impl Domain {
 impl Drop for Domain {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.files);
-        if let Ok(place) = self.config().place() {
+        if let Ok(place) = self.config().home() {
             place.remove();
         }
     }
 }
 
-/// Removes the buses of that family whose process is no more.
+/// Removes the buses of that family whose process has ended.
 fn remove_orphans(family: &str) {
     let Ok(entries) = std::fs::read_dir(SHARED_MEMORY) else {
         return;
@@ -190,9 +189,9 @@ mod tests {
 
     #[test]
     fn what_a_killed_program_left_goes_with_the_next_one() {
-        // A process id that is not in use: the kernel gives none above its limit.
+        // No process has this id: the kernel gives none above its limit.
         let orphan = Domain::of(FAMILY, u32::MAX, 7);
-        let place = orphan.place();
+        let place = orphan.home();
         let segment = Path::new(SHARED_MEMORY).join(format!("{}left", place.prefix()));
         std::fs::write(&segment, b"left").unwrap();
         assert_eq!(orphan.left(), std::slice::from_ref(&segment));

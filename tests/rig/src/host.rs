@@ -1,8 +1,8 @@
-//! The Pi's end of a board's cable, for tests of what plays the boards: it answers them, and sends
-//! what it is told to.
+//! The Pi's end of a board's cable, for tests of programs that play the boards. It answers the
+//! board and sends what the test tells it.
 //!
-//! It stands on nothing else of this crate and on no bus, because the emulator's tests, in a
-//! workspace of their own, have this file as a module of theirs.
+//! It uses nothing else of this crate and no bus, because the emulator's tests, in a workspace of
+//! their own, include this file as a module.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Result, Write};
@@ -14,20 +14,20 @@ use lager_wire::link::{HostEvent, HostLink, HostTransmitter};
 use lager_wire::{Payload, ResetCause};
 use rustix::fs::OFlags;
 
-/// One serial port as the Pi has it open.
+/// One serial port, opened as the Pi opens it.
 #[derive(Debug)]
 pub struct Host {
     file: File,
-    /// Its end of the link.
+    /// The Pi's end of the link.
     pub link: HostLink,
     transmitter: HostTransmitter,
     start: Instant,
-    /// Why the board last started, if it has come up.
+    /// The reason of the board's last start; `None` before its link has come up.
     pub reset: Option<ResetCause>,
 }
 
 impl Host {
-    /// Opens the port, for which it waits at most `limit`.
+    /// Opens the port, and waits at most `limit` until it exists.
     ///
     /// # Errors
     /// It cannot be opened.
@@ -52,13 +52,13 @@ impl Host {
         })
     }
 
-    /// Takes what has come, hands over each packet's data, and sends the handshakes that are due.
+    /// Reads what came, hands over each packet's data, and sends the handshakes that are due.
     ///
     /// # Errors
     /// The port does not take them.
     pub fn answer(&mut self, mut packet: impl FnMut(Payload)) -> Result<()> {
         let mut bytes = [0; 512];
-        // A port that is empty, or has nobody at its other end, reads as an error.
+        // A read fails when there are no bytes, and when nobody is at the other end.
         let count = self.file.read(&mut bytes).unwrap_or(0);
         let now = self.start.elapsed();
         for byte in &bytes[..count] {

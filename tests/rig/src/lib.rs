@@ -1,21 +1,22 @@
-//! What tests and benches stand on: a bus of their own, this program again as another process,
-//! memory that processes share, boards and their Pi at the ends of pseudo terminals, and an
+//! Helpers for tests and benches: a bus of their own, this program started again as another
+//! process, memory that processes share, boards and their Pi behind pseudo terminals, and an
 //! allocator that counts.
 //!
-//! Apart from both, so that each of these exists once. Nothing here measures or asserts.
+//! They are a crate of their own, so that each exists once. Nothing here measures or asserts.
 
 pub mod allocations;
 mod board;
+pub mod boards;
 mod cable;
 mod domain;
 mod host;
 mod interrupts;
 mod map;
 mod outset;
+pub mod proc;
 pub mod process;
 pub mod schedule;
 mod shared;
-pub mod told;
 
 pub use board::{Board, GAP_US, SPEAK_EVERY_NS, answer_to, wheels_in_the_air};
 pub use cable::{Cable, timespec};
@@ -27,20 +28,20 @@ pub use outset::Outset;
 pub use process::{Parent, Process, ProcessError};
 pub use shared::{Barrier, Counter, Shareable, Shared, inherit};
 
-/// The kernel refused something that a test or a measurement is made of.
+/// The kernel refused something that a test or a measurement needs.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{what} could not be made ({detail}); check the limit of open files (ulimit -n) and free memory"
 )]
 pub struct Refused {
-    /// What was to be made.
+    /// The thing that could not be made.
     pub what: &'static str,
-    /// What the kernel says.
+    /// The kernel's reason.
     pub detail: String,
 }
 
 impl Refused {
-    /// That `what` could not be made.
+    /// Makes this error out of the kernel's, for `map_err`; `what` could not be made.
     pub fn to_make<E: core::fmt::Display>(what: &'static str) -> impl FnOnce(E) -> Self {
         move |error| Self {
             what,

@@ -1,6 +1,7 @@
 //! The smallest warehouse in which a robot has somewhere to drive.
 
-use lager_topics::{MapProduct, Side, WarehouseMap};
+use lager_floor::Heading;
+use lager_topics::{MapProduct, WarehouseMap};
 
 /// One square with product 1 on the edge along which the robot looks: no turn, no crossing.
 #[must_use]
@@ -14,7 +15,7 @@ pub fn one_square() -> WarehouseMap {
     };
     map.products[0] = MapProduct {
         id: 1,
-        side: Side::Down.into(),
+        side: Heading::Down.into(),
         ..MapProduct::default()
     };
     map

@@ -1,12 +1,14 @@
-//! What a robot's operator does so that it sets out: the map, the autonomous mode, an order.
+//! An operator for tests: it gives the map, sets the autonomous mode and gives an order, until the
+//! robot sets out.
 
 use core::error::Error;
 use core::time::Duration;
 use std::time::Instant;
 
+use lager_orders::Mode;
 use lager_ports::{Bus, Cause, Client, Publisher, Subscriber};
 use lager_topics::{
-    Ask, AskKind, BridgeRequest, LinkHealth, MissionOrder, Mode, NavMap, NavStatus, Order, Phase,
+    Ask, AskKind, BridgeRequest, LinkHealth, MissionOrder, NavMap, NavStatus, Order, Phase,
 };
 
 use crate::one_square;
@@ -14,11 +16,11 @@ use crate::one_square;
 /// How long the bridge may take to answer.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(30);
 
-/// An order that came before logic had its place on the topic is given again after this time.
+/// The operator repeats its order after this time, since logic may have subscribed after the first.
 const ORDER_AGAIN: Duration = Duration::from_millis(500);
 
-/// The operator of a robot in a warehouse of [`one_square`]. The robot must not be without it: late
-/// joiners get the map from here.
+/// The operator of a robot in a warehouse of [`one_square`]. Keep it as long as the robot runs:
+/// processes that join the bus later get the map from it.
 #[derive(Debug)]
 pub struct Outset {
     health: Subscriber<LinkHealth>,
@@ -49,8 +51,8 @@ impl Outset {
         })
     }
 
-    /// Does what is to be done next; whether the robot is on its way to its product. To be called
-    /// again and again while somebody plays the boards.
+    /// Does the next thing, and returns whether the robot is on its way to its product. Call it
+    /// again and again while the test plays the boards.
     ///
     /// # Errors
     /// The bus fails, or the bridge does not answer.

@@ -1,4 +1,4 @@
-//! Other processes of a test or a measurement: this program started again, as one of them.
+//! The other processes of a test or a measurement: the same program, started again in another role.
 //!
 //! ```text
 //!   parent (a test, a bench target, lager bench)       child
@@ -6,10 +6,10 @@
 //!     Process::tell / hear          ── lines of JSON ──> Parent::hear / say
 //! ```
 //!
-//! A child dies with the thread that started it, is out of reach of Ctrl-C on the terminal, and is
-//! killed when its [`Process`] is dropped. The parent never waits for one without a limit. What a
-//! child says begins with the character RS (RFC 7464), so whatever else is printed is passed over,
-//! as a test harness does it.
+//! A child dies with the thread that started it, gets no Ctrl-C from the terminal, and is killed
+//! when its [`Process`] is dropped. Each wait of the parent has a limit. Each message of a child
+//! begins with the character RS (RFC 7464); the parent skips other lines, which a test harness may
+//! print.
 
 use core::error::Error;
 use core::fmt;
@@ -27,19 +27,19 @@ use serde::{Deserialize, Serialize};
 use crate::interrupts::interrupted;
 use crate::schedule::schedule;
 
-/// What a child does: hears from its parent, and returns when it hears nothing more.
+/// The work of a child: it hears from its parent, and returns when the parent says nothing more.
 pub type Main = fn(&mut Parent) -> Result<(), Box<dyn Error>>;
 
-/// Names the process that a program is to be.
+/// The environment variable with the name of the process that this program is to be.
 const VARIABLE: &str = "LAGER_PROCESS";
 
-/// How long a child may be silent unless a longer time is given.
+/// How long a parent waits for a child's next message, unless the caller gives another limit.
 pub const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Begins what a child says.
+/// The first character of a child's message.
 const RS: u8 = 0x1e;
 
-/// Why a child is of no use.
+/// Why the parent can no longer use a child.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProcessError {
     /// It could not be started.
@@ -47,9 +47,9 @@ pub enum ProcessError {
         "the process `{process}` could not be started ({detail}); the executable may have been replaced meanwhile, start again"
     )]
     Start {
-        /// Its name.
+        /// The name of the process.
         process: String,
-        /// What the kernel says.
+        /// The kernel's reason.
         detail: String,
     },
     /// It ended too early.
@@ -57,17 +57,17 @@ pub enum ProcessError {
         "the process `{process}` ended before it was done ({detail}); look at its messages above and start again"
     )]
     Ended {
-        /// Its name.
+        /// The name of the process.
         process: String,
         /// How it ended.
         detail: String,
     },
-    /// It says what went wrong.
+    /// It reports an error.
     #[error("{detail}")]
     Failed {
-        /// Its name.
+        /// The name of the process.
         process: String,
-        /// Its sentence.
+        /// The child's sentence.
         detail: String,
     },
     /// It said nothing for too long.
@@ -75,25 +75,25 @@ pub enum ProcessError {
         "the process `{process}` did not answer within {limit:?}; a wake-up was lost or the machine is overloaded: start again, and report it if it happens twice"
     )]
     Silent {
-        /// Its name.
+        /// The name of the process.
         process: String,
-        /// How long it was waited for.
+        /// How long the parent waited.
         limit: Duration,
     },
-    /// Somebody wants to stop ([`crate::heed_interrupts`]).
+    /// The user wants to stop ([`crate::heed_interrupts`]).
     #[error("interrupted")]
     Interrupted,
 }
 
-/// If this program was started to be a process of `tables`, is that and ends. To be called first
-/// thing in `main`.
+/// If this program was started as a process of `tables`, does that process's work and ends. Call it
+/// first in `main`.
 pub fn run_if_asked(tables: &[&[(&str, Main)]]) {
     if let Some(mut parent) = Parent::of_this_process() {
         parent.run(tables);
     }
 }
 
-/// What a child says.
+/// A child's message.
 #[derive(Serialize, Deserialize)]
 enum Message<T> {
     Said(T),
@@ -111,13 +111,13 @@ impl Parent {
     #[must_use]
     pub fn of_this_process() -> Option<Self> {
         let name = std::env::var(VARIABLE).ok()?;
-        // Without it a child would outlive a parent that is killed; with it, one that is orphaned
-        // already ends at the first word it does not hear.
+        // Without this signal a child would outlive a parent that is killed. If the parent is gone
+        // already, the child ends anyway, at its first `hear`.
         let _ = set_parent_process_death_signal(Some(Signal::KILL));
         Some(Self { name })
     }
 
-    /// What this process is to be.
+    /// The name of the process that this program is to be.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -136,17 +136,17 @@ impl Parent {
         std::process::exit(match result {
             Ok(()) => 0,
             Err(error) => {
-                // If the parent is gone, nobody is left to be told.
+                // If the parent is gone, nobody hears the error.
                 let _ = write(&Message::<()>::Failed(error.to_string()));
                 1
             }
         });
     }
 
-    /// What the parent says next; `None` when it has nothing more to say.
+    /// The parent's next message; `None` when the parent has closed the line.
     ///
     /// # Errors
-    /// It is not understood.
+    /// The message cannot be decoded.
     pub fn hear<T: DeserializeOwned>(&mut self) -> Result<Option<T>, ProcessError> {
         let mut line = String::new();
         match std::io::stdin().read_line(&mut line) {
@@ -160,10 +160,10 @@ impl Parent {
         }
     }
 
-    /// What the parent says first. One that hears nothing has nothing to do, and ends.
+    /// The parent's first message. If the parent closes the line instead, this process ends.
     ///
     /// # Errors
-    /// It is not understood.
+    /// The message cannot be decoded.
     pub fn told<T: DeserializeOwned>(&mut self) -> Result<T, ProcessError> {
         match self.hear()? {
             Some(told) => Ok(told),
@@ -171,7 +171,7 @@ impl Parent {
         }
     }
 
-    /// Says `what` to the parent.
+    /// Sends `what` to the parent.
     ///
     /// # Errors
     /// The parent is gone.
@@ -180,7 +180,7 @@ impl Parent {
     }
 }
 
-/// Says to this child's parent that it is ready, from any of its threads.
+/// Tells this child's parent that the child is ready; any thread of the child may call it.
 ///
 /// # Panics
 /// When the parent is gone.
@@ -188,7 +188,7 @@ pub fn ready() {
     write(&Message::Said(())).expect("a parent");
 }
 
-/// Waits until the parent is done with this child or gone, and ends the child.
+/// Waits until the parent has closed the line or is gone, and ends the child.
 pub fn end_with_parent() -> ! {
     let mut nothing = String::new();
     while std::io::stdin()
@@ -208,13 +208,13 @@ fn write<T: Serialize>(message: &Message<T>) -> Result<(), ProcessError> {
         .map_err(|_| ProcessError::Interrupted)
 }
 
-/// A parent's end of the line to a child, and the child's life.
+/// A child and the parent's end of the line to it.
 ///
-/// Stays in the thread that started it: the child dies with that thread.
+/// It stays in the thread that started it, because the child dies with that thread.
 pub struct Process {
     name: String,
     child: Child,
-    /// `None` when nothing more is to be said.
+    /// `None` when the parent has closed the line.
     stdin: Option<ChildStdin>,
     stdout: BufReader<ChildStdout>,
     heard: Vec<u8>,
@@ -229,8 +229,8 @@ impl Process {
         Self::spawn(name, &mut Command::new("/proc/self/exe"))
     }
 
-    /// Starts this program under the standard test harness as the process `name`, which its test
-    /// `test` is: one that is ignored otherwise.
+    /// Starts this program under the standard test harness as the process `name`. The work of that
+    /// process is the ignored test `test`.
     ///
     /// # Errors
     /// The kernel refuses.
@@ -238,7 +238,7 @@ impl Process {
         Self::spawn(name, Command::new("/proc/self/exe").args(in_test(test)))
     }
 
-    /// The same under a program that is given this one and its arguments, as `strace` is.
+    /// The same under another program that starts this one, such as `strace`.
     ///
     /// # Errors
     /// The kernel refuses.
@@ -258,7 +258,7 @@ impl Process {
         };
         let mut child = command
             .env(VARIABLE, name)
-            // Ctrl-C on the terminal is the parent's to handle.
+            // A group of its own: only the parent gets Ctrl-C from the terminal.
             .process_group(0)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -282,38 +282,38 @@ impl Process {
         self.child.id()
     }
 
-    /// Sends it a signal, if it has not ended.
+    /// Sends a signal to the child, if it has not ended.
     pub fn signal(&self, signal: Signal) {
         let _ = kill_process(Pid::from_child(&self.child), signal);
     }
 
-    /// Whether it still runs.
+    /// Whether the child still runs.
     ///
     /// # Panics
-    /// When the kernel does not say.
+    /// When the kernel does not say so.
     pub fn is_running(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
     }
 
-    /// Says `what` to the child.
+    /// Sends `what` to the child.
     pub fn tell<T: Serialize>(&mut self, what: &T) {
         let mut line = serde_json::to_vec(what).expect("messages are plain data");
         line.push(b'\n');
         if let Some(stdin) = &mut self.stdin {
-            // A write that fails means that the child has ended; what it said last tells why.
+            // A write fails when the child has ended; the child's last message tells the reason.
             let _ = stdin.write_all(&line);
         }
     }
 
-    /// What the child says next, within [`PATIENCE`].
+    /// The child's next message, if it comes within [`PATIENCE`].
     ///
     /// # Errors
-    /// It says why it failed, has ended, or is silent; or somebody wants to stop.
+    /// The child reports an error, has ended, or is silent; or the user wants to stop.
     pub fn hear<T: DeserializeOwned>(&mut self) -> Result<T, ProcessError> {
         self.hear_within(PATIENCE)
     }
 
-    /// What the child says next, within `limit`.
+    /// The child's next message, if it comes within `limit`.
     ///
     /// # Errors
     /// As [`Process::hear`].
@@ -332,7 +332,7 @@ impl Process {
         }
     }
 
-    /// Says `what` and hears the answer.
+    /// Sends `what` and waits for the answer.
     ///
     /// # Errors
     /// As [`Process::hear`].
@@ -341,17 +341,17 @@ impl Process {
         self.hear()
     }
 
-    /// What both say next, within `limit`.
+    /// The next message of each of two children, if both come within `limit`.
     ///
     /// # Errors
-    /// As [`Process::hear`]. If either fails, the one that knows why is believed: a process whose
-    /// partner has failed only knows that nothing came.
+    /// As [`Process::hear`]. If one child reports an error and the other is only silent, this
+    /// returns the reported error, because it tells the cause.
     pub fn both<A: DeserializeOwned, B: DeserializeOwned>(
         first: &mut Self,
         second: &mut Self,
         limit: Duration,
     ) -> Result<(A, B), ProcessError> {
-        // Enough for one that has noticed to say so.
+        // Long enough for a child that has noticed the error to report it.
         const AFTERWARDS: Duration = Duration::from_millis(500);
         let one = first.hear_within(limit);
         let other = second.hear_within(if one.is_ok() { limit } else { AFTERWARDS });
@@ -365,23 +365,23 @@ impl Process {
         }
     }
 
-    /// Says nothing more, and waits until the child has ended.
+    /// Closes the line to the child, and waits until the child has ended.
     ///
     /// # Panics
-    /// When the kernel does not say how.
+    /// When the kernel does not say how it ended.
     pub fn end(mut self) -> ExitStatus {
         self.stdin = None;
         self.child.wait().expect("a child")
     }
 
-    /// `kill -9`, and waits until it is gone.
+    /// Kills the child (`kill -9`), and waits until it is gone.
     pub fn kill(self) {
         drop(self);
     }
 
-    /// The next message without its first character; other lines are passed over.
+    /// The next message without its first character; other lines are skipped.
     fn message(&mut self, limit: Duration) -> Result<Vec<u8>, ProcessError> {
-        // Interrupts are looked for this often.
+        // The parent looks for interrupts this often.
         const SLICE: Timespec = Timespec {
             tv_sec: 0,
             tv_nsec: 50_000_000,
@@ -411,7 +411,7 @@ impl Process {
                 });
             }
             let mut waiting = [PollFd::new(self.stdout.get_ref(), PollFlags::IN)];
-            // A signal ends the sleep early, which the loop bears.
+            // A signal ends this sleep early; then the loop goes on.
             let _ = poll(&mut waiting, Some(&SLICE));
         }
     }
@@ -428,18 +428,18 @@ impl Process {
     }
 }
 
-/// What the standard test harness is told to run an ignored test alone.
+/// The arguments with which the standard test harness runs one ignored test alone.
 fn in_test(test: &str) -> [&str; 4] {
     [test, "--exact", "--ignored", "--nocapture"]
 }
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // Linux waits, without giving its core away, for whoever reads in /proc of a process that
-        // it takes down: a process of real time that keeps a less urgent one from that core would
-        // never end.
+        // When Linux takes a process down, it waits, without giving its core away, for every reader
+        // of that process's `/proc`. If this process runs in real time and keeps such a reader from
+        // the core, it waits for ever.
         let _ = schedule(libc::SCHED_OTHER);
-        // It may have ended already, which is as good.
+        // It may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

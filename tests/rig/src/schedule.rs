@@ -1,16 +1,16 @@
-//! How urgent a thread is to the kernel, and which cores it may run on.
+//! Sets how urgent a thread is to the kernel, and which cores it may run on.
 
 use core::error::Error;
 use core::marker::PhantomData;
 
-use lager_ports::urgency;
+use lager_wake::urgency;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 
 /// Gives the calling thread a scheduling class without priorities (`libc::SCHED_IDLE`, …).
 ///
 /// # Errors
-/// The user may not.
+/// The user has no right to this class.
 #[allow(unsafe_code)]
 pub fn schedule(class: i32) -> std::io::Result<()> {
     let parameter = libc::sched_param { sched_priority: 0 };
@@ -21,23 +21,23 @@ pub fn schedule(class: i32) -> std::io::Result<()> {
     }
 }
 
-/// The user may not run processes in real time.
+/// The user has no right to run processes in real time.
 #[derive(Debug, thiserror::Error)]
 #[error("no right to run in real time ({0}); run as root, or give this user rtprio (`ulimit -r`)")]
 pub struct NoRealTime(std::io::Error);
 
-/// The calling thread comes before all that is not real time, as long as this lives; so do the
-/// threads and processes that it starts meanwhile. Stays in that thread.
+/// As long as this lives, the calling thread runs before all threads that are not real time. So do
+/// the threads and processes that it starts meanwhile. The value stays in its thread.
 #[derive(Debug)]
 pub struct RealTime {
     _in_its_thread: PhantomData<*const ()>,
 }
 
 impl RealTime {
-    /// From now on, with that priority under SCHED_FIFO.
+    /// Makes the calling thread a SCHED_FIFO thread of that priority.
     ///
     /// # Errors
-    /// The user may not.
+    /// The user has no right to that.
     pub fn begin(priority: u8) -> Result<Self, NoRealTime> {
         urgency::set_fifo(priority).map_err(NoRealTime)?;
         Ok(Self {
@@ -48,32 +48,32 @@ impl RealTime {
 
 impl Drop for RealTime {
     fn drop(&mut self) {
-        // Anybody may become less urgent.
+        // Every user may make a thread less urgent.
         let _ = schedule(libc::SCHED_OTHER);
     }
 }
 
-/// Where a process of the path runs, and how urgently.
+/// The core and the urgency of one process of the path.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Place {
-    /// The core it is bound to; `None` = any.
+pub struct Placement {
+    /// The core to which the process is bound; `None` = any core.
     pub core: Option<usize>,
     /// Its SCHED_FIFO priority; `None` = under the normal scheduler, with short slices.
     pub priority: Option<u8>,
 }
 
-impl Place {
-    /// Takes the place for the rest of the thread's life, with all that it starts later.
+impl Placement {
+    /// Applies both to the calling thread, for the rest of its life, and to all that it starts.
     ///
     /// # Errors
-    /// The kernel refuses, or the user may not.
+    /// The kernel refuses, or the user has no right to it.
     pub fn take(self) -> Result<(), Box<dyn Error>> {
         if let Some(core) = self.core {
             pin(core)?;
         }
         match self.priority {
             Some(priority) => core::mem::forget(RealTime::begin(priority)?),
-            // Where a sandbox forbids it, none of those that are compared has them.
+            // In a sandbox that forbids short slices, no compared process has them.
             None => drop(urgency::shorten_slices()),
         }
         Ok(())
@@ -101,7 +101,7 @@ pub fn usable_cores() -> Vec<usize> {
         .collect()
 }
 
-/// Binds the calling thread to `core`, and what it starts from now on.
+/// Binds the calling thread, and all that it starts from now on, to `core`.
 ///
 /// # Errors
 /// The kernel refuses.
@@ -113,7 +113,7 @@ pub fn pin(core: usize) -> Result<(), Unbound> {
     sched_setaffinity(None, &set).map_err(|detail| Unbound { core, detail })
 }
 
-/// The thread that made this is bound to a core as long as this lives; stays in that thread.
+/// Binds the thread that made it to a core until it is dropped; stays in that thread.
 #[derive(Debug)]
 pub struct Bound {
     before: CpuSet,
@@ -137,7 +137,7 @@ impl Bound {
 
 impl Drop for Bound {
     fn drop(&mut self) {
-        // Refused only if the cores have been taken away meanwhile, and then nothing is to be done.
+        // This fails only if the cores have been taken away meanwhile; then nothing can be done.
         let _ = sched_setaffinity(None, &self.before);
     }
 }

@@ -1,7 +1,7 @@
-//! Memory and descriptors that processes share without a name, so that nothing is left when they
+//! Memory and descriptors without a name that processes share. Nothing is left when the processes
 //! end, however they end.
 //!
-//! A parent makes them and its children inherit them by number. The bus does not use them.
+//! A parent makes them, and its children inherit them by number. The bus does not use them.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -17,11 +17,11 @@ use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 
 use crate::Refused;
 
-/// What may lie in memory shared with other processes.
+/// A type that may lie in memory shared with other processes.
 ///
 /// # Safety
-/// All zeros are a valid value, every field may be changed by another process at any time (atomics
-/// and arrays of them only), and there is no pointer inside.
+/// All zeros are a valid value. Every field is an atomic or an array of atomics, because another
+/// process may change it at any time. There is no pointer inside.
 #[allow(unsafe_code)]
 pub unsafe trait Shareable: Sync {}
 
@@ -33,10 +33,10 @@ pub struct Shared<T: Shareable> {
 }
 
 impl<T: Shareable> Shared<T> {
-    /// Makes it.
+    /// Makes the shared memory.
     ///
     /// # Errors
-    /// There is no memory, or no descriptor.
+    /// The kernel gives no memory or no descriptor.
     pub fn new() -> Result<Self, Refused> {
         // Without CLOEXEC: children inherit it.
         let file = memfd_create("lager-rig", MemfdFlags::empty()).map_err(no_memory)?;
@@ -44,15 +44,15 @@ impl<T: Shareable> Shared<T> {
         Self::map(file)
     }
 
-    /// The one that the parent has made, by its number there.
+    /// Maps the memory that the parent has made; `number` is the parent's descriptor.
     ///
     /// # Errors
-    /// It cannot be mapped.
+    /// The kernel cannot map it.
     pub fn inherited(number: RawFd) -> Result<Self, Refused> {
         Self::map(inherit(number))
     }
 
-    /// The number by which a child finds it.
+    /// The descriptor's number, by which a child maps the memory.
     #[must_use]
     pub fn number(&self) -> RawFd {
         self.file.as_raw_fd()
@@ -108,12 +108,12 @@ impl<T: Shareable> fmt::Debug for Shared<T> {
     }
 }
 
-/// The descriptor that the parent has made, by its number there. Each number at most once.
+/// The descriptor that the parent has made, by its number. Call this at most once for a number.
 #[must_use]
 #[allow(unsafe_code)]
 pub fn inherit(number: RawFd) -> OwnedFd {
-    // SAFETY: the parent made it without CLOEXEC for this process, which nobody else told the
-    // number, and each is taken over once.
+    // SAFETY: the parent made the descriptor without CLOEXEC for this process and told the number
+    // to nobody else, and each number is taken over once.
     unsafe { OwnedFd::from_raw_fd(number) }
 }
 
@@ -121,7 +121,7 @@ fn no_memory(error: rustix::io::Errno) -> Refused {
     Refused::to_make("memory shared between the processes")(error)
 }
 
-/// Where processes wait for each other before they start measuring.
+/// A barrier at which processes wait for each other before they start measuring.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub struct Barrier {
@@ -129,9 +129,9 @@ pub struct Barrier {
 }
 
 impl Barrier {
-    /// Waits until `all` processes have arrived as often as this one, which is at its `round`th
-    /// barrier, from 1. Looks without sleeping, so that all go on at once; false if somebody has
-    /// not come within `limit`.
+    /// Waits until all processes, `all` in number, have reached their barrier number `round`,
+    /// counted from 1. Looks without sleeping, so that all go on at the same time. Returns false if
+    /// one process has not come within `limit`.
     pub fn pass(&self, all: u32, round: u32, limit: Duration) -> bool {
         let start = Instant::now();
         self.arrived.fetch_add(1, Ordering::AcqRel);
@@ -139,7 +139,7 @@ impl Barrier {
             if start.elapsed() > limit {
                 return false;
             }
-            // The others may be on this core.
+            // The other processes may need this core.
             rustix::thread::sched_yield();
         }
         true
@@ -152,14 +152,14 @@ impl Barrier {
 pub struct Counter(AtomicU64);
 
 impl Counter {
-    /// Sets it; who sees that also sees all that was written before.
+    /// Sets the number. A process that sees it also sees everything that was written before.
     pub fn set(&self, number: u64) {
         self.0.store(number, Ordering::Release);
     }
 
-    /// Waits without sleeping until it is `number`; false if it is not within `limit`.
+    /// Waits without sleeping until the value is `number`; false if `limit` has passed.
     pub fn becomes(&self, number: u64, limit: Duration) -> bool {
-        // Looking at the clock costs more than looking at a word.
+        // Reading the clock costs more than reading a word.
         const LOOKS: u32 = 1_000;
         let start = Instant::now();
         while start.elapsed() < limit {
@@ -167,7 +167,7 @@ impl Counter {
                 if self.0.load(Ordering::Acquire) == number {
                     return true;
                 }
-                // The other process may be on this core.
+                // The other process may need this core.
                 rustix::thread::sched_yield();
             }
         }

@@ -1,10 +1,12 @@
-//! What each topic looks like.
+//! How each topic is drawn.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use lager_floor::Heading;
+use lager_sample::Tag;
 use lager_topics::{
-    BlockSource, BlockedWays, FailureKind, GoodState, Heading, Pose as Believed, Side, Tag,
-    Thought, ThoughtKind, Truth, WarehouseMap,
+    BlockSource, BlockedWays, FailureKind, GoodState, Pose as Believed, Thought, ThoughtKind,
+    Truth, WarehouseMap,
 };
 
 use super::shapes::{
@@ -16,16 +18,16 @@ use super::shapes::{
 const MAP: &str = "map";
 /// The frame of the robot, its origin on the floor below the middle of the axle, x ahead.
 const ROBOT: &str = "robot";
-/// The same where the navigator takes the robot to be.
+/// The same, at the place where the navigator believes the robot to be.
 const NAVIGATOR: &str = "navigator";
 
 /// The tape's width, in m.
 const TAPE_M: f64 = 0.02;
 /// Goods are cubes of this side, in m.
 const GOODS_M: f64 = 0.05;
-/// What stands on a way, in m.
+/// The size of a thing that stands on a way, in m.
 const THING_M: f64 = 0.1;
-/// Letters' height, in m.
+/// The height of letters, in m.
 const LETTERS_M: f64 = 0.06;
 
 /// Levels of a log.
@@ -61,10 +63,10 @@ pub(super) fn map(map: &WarehouseMap, time: Time) -> SceneUpdate {
     ));
     for product in map.products() {
         let Some(place) = product.side.get().map(|which| match which {
-            Side::Left => (0.0, 0.5),
-            Side::Right => (1.0, 0.5),
-            Side::Up => (0.5, 1.0),
-            Side::Down => (0.5, 0.0),
+            Heading::Left => (0.0, 0.5),
+            Heading::Right => (1.0, 0.5),
+            Heading::Up => (0.5, 1.0),
+            Heading::Down => (0.5, 0.0),
         }) else {
             continue;
         };
@@ -80,7 +82,7 @@ pub(super) fn map(map: &WarehouseMap, time: Time) -> SceneUpdate {
     entity.into()
 }
 
-/// The ways on which something stands, as far as the robot knows.
+/// The ways that are blocked, as the robot knows them.
 pub(super) fn blocks(ways: &BlockedWays, map: &WarehouseMap, time: Time) -> SceneUpdate {
     let side = side_m(map);
     let mut entity = Entity::new(MAP, "blocks", time);
@@ -168,7 +170,7 @@ pub(super) fn believed_frame(pose: Believed, time: Time) -> FrameTransform {
     moved(NAVIGATOR, believed_pose(pose), time)
 }
 
-/// What a service thinks; a failure and whatever keeps the robot from its work is a warning.
+/// A service's thought. A failure, and everything that makes the robot wait, is a warning.
 pub(super) fn log(thought: &Thought, time: Time) -> Log {
     let is_failure = thought.failure.kind.get() != Some(FailureKind::None);
     let is_warning = is_failure
@@ -221,7 +223,7 @@ fn believed_pose(pose: Believed) -> Pose {
         f64::from(pose.y_mm) / 1000.0,
         0.0,
     );
-    // From clockwise from up to counter-clockwise from the right.
+    // The payload counts clockwise from "up"; the viewer counts the other way, from "right".
     let angle = FRAC_PI_2 - f64::from(pose.heading_deg) * PI / 180.0;
     Pose::new(place, angle)
 }

@@ -1,5 +1,5 @@
-//! What a person looks at, in the words of Foxglove: the warehouse, the robot in it, and what it
-//! thinks, so that a viewer shows them without set-up.
+//! Draws the warehouse, the robot in it and its thoughts, as messages that Foxglove shows without
+//! any setting.
 //!
 //! ```text
 //!  nav/map     ──> foxglove/map        SceneUpdate: tape, goods' places, delivery
@@ -13,9 +13,9 @@
 //!  log/thought ──> foxglove/log        Log
 //! ```
 //!
-//! A [`Scene`] takes messages as a recording has them ([`Envelope`]) and gives more messages, for
-//! channels of their own ([`View`]). It is a pure function of what it was given: nothing in it is a
-//! sample of the bus, and whoever reads a recording for its samples skips these channels.
+//! A [`Scene`] takes messages as they are in a recording ([`Envelope`]), and returns more messages,
+//! for channels of their own ([`View`]). It is pure. These messages are not samples of the bus, and
+//! tools that want samples skip their channels.
 //!
 //! Lengths are in m. `map` has its origin at node (0, 0), x to the right and y up.
 
@@ -23,8 +23,9 @@ mod drawn;
 mod schema;
 mod shapes;
 
+use lager_sample::Topic;
 use lager_topics::{
-    BlockedWays, LogThought, NavBlocks, NavMap, NavStatus, NavigatorStatus, Thought, Topic, Truth,
+    BlockedWays, LogThought, NavBlocks, NavMap, NavStatus, NavigatorStatus, Thought, Truth,
     TruthPose, WarehouseMap,
 };
 use serde::Serialize;
@@ -34,7 +35,7 @@ use crate::envelope::{Envelope, EnvelopeSchema};
 pub use schema::Kind;
 use shapes::Time;
 
-/// A channel of its own for what is derived.
+/// A channel of derived messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum View {
     /// The warehouse.
@@ -47,9 +48,9 @@ pub enum View {
     Bodies,
     /// Where the robot is.
     Pose,
-    /// Where the navigator takes it to be.
+    /// Where the navigator believes the robot to be.
     Believed,
-    /// The robot's frames in that of the warehouse.
+    /// The robot's frames within the warehouse's frame.
     Frames,
     /// What the services think.
     Log,
@@ -82,7 +83,7 @@ impl View {
         }
     }
 
-    /// What its messages are.
+    /// The kind of its messages.
     pub const fn kind(self) -> Kind {
         match self {
             Self::Map | Self::Blocks | Self::World | Self::Bodies => Kind::SceneUpdate,
@@ -92,7 +93,7 @@ impl View {
         }
     }
 
-    /// The topics of whose messages it is made.
+    /// The topics from which its messages are derived.
     pub const fn made_of(self) -> &'static [&'static str] {
         match self {
             Self::Map => &[NavMap::NAME],
@@ -112,8 +113,8 @@ impl View {
         }
     }
 
-    /// Whether what it shows lasts until something else takes its place, so that a reader who
-    /// begins later wants the last message.
+    /// Whether its last message stays true until the next one, so that a reader who begins later
+    /// needs it.
     pub const fn is_lasting(self) -> bool {
         matches!(self.kind(), Kind::SceneUpdate)
     }
@@ -128,24 +129,24 @@ pub struct Shown {
     pub message: Vec<u8>,
 }
 
-/// What is derived so far.
+/// The state from which messages are derived.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     map: Option<Box<WarehouseMap>>,
     blocks: Option<Box<BlockedWays>>,
-    /// What stands on the floor as it was shown last, and when.
+    /// The things on the floor as they were shown last, and when.
     world: Option<(u64, Box<Truth>)>,
     has_bodies: bool,
-    /// The last message of each view that lasts.
+    /// The last message of each view that stays true.
     lasting: Vec<Shown>,
 }
 
-/// Goods that are carried are shown so often, in ns.
+/// Goods that move are shown at this interval, in ns.
 const WORLD_PACE_NS: u64 = 100_000_000;
 
 impl Scene {
-    /// Takes a message of a topic, published at that time in ns since 1970, and returns what is to
-    /// be shown. A topic that is not looked at and a message of another build show nothing.
+    /// Takes a message of a topic, published at that time in ns since 1970, and returns the
+    /// messages to show. A message of another topic or another build gives none.
     pub fn take(&mut self, topic: &str, unix_ns: u64, message: &[u8]) -> Vec<Shown> {
         let mut shown = Vec::new();
         let time = Time::of_ns(unix_ns);
@@ -197,7 +198,7 @@ impl Scene {
         View::ALL.iter().any(|view| view.made_of().contains(&topic))
     }
 
-    /// What a reader who begins now has missed and would have to see.
+    /// The messages that a reader who begins now needs first.
     pub fn lasting(&self) -> &[Shown] {
         &self.lasting
     }

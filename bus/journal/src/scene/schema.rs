@@ -1,7 +1,7 @@
 //! The `foxglove.*` schemas as JSON Schema, for the four kinds of message that a scene has.
 //!
-//! Names of fields, their kinds and which are required are those of the published schemas
-//! (`@foxglove/schemas` 2.1.0), without the descriptions. A test holds them to the CRCs of those.
+//! The fields, their kinds and the list of required ones are those of the published schemas
+//! (`@foxglove/schemas` 2.1.0), without the descriptions. A test compares them by CRC.
 
 use serde_json::{Map, Value, json};
 

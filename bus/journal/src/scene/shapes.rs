@@ -1,4 +1,4 @@
-//! What the messages of a scene are made of, with the names that the schemas give.
+//! The parts of a scene's messages, with the names of the schemas.
 //!
 //! Lengths are in m, angles in rad. Angles about the vertical turn counter-clockwise from +x.
 
@@ -172,7 +172,7 @@ struct Lifetime {
     nsec: u32,
 }
 
-/// Shapes that belong together. One with the id of an earlier one takes its place.
+/// Shapes that belong together. They replace earlier shapes with the same id.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Entity {
     timestamp: Time,

@@ -4,11 +4,12 @@
 
 use core::fmt;
 
+use lager_floor::{Heading, Node, ProductId};
+use lager_orders::{Mode, Pick};
 use lager_wire::{Binary, LineBits};
 
-use super::mode::{Mode, Pick};
+use crate::floor::product;
 use crate::text::Name;
-use crate::warehouse::{Coord, Direction, ProductId};
 
 /// Defines a struct, how each field is read and in which order they are written.
 macro_rules! fields {
@@ -153,6 +154,22 @@ macro_rules! numbers {
 
 numbers!(u8, u16, u32, u64, i8, i16, i32);
 
+macro_rules! words {
+    ($($type:ty),*) => { $(
+        impl Value for $type {
+            fn of(text: &str) -> Option<Self> {
+                Self::from_word(text)
+            }
+
+            fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str(self.as_str())
+            }
+        }
+    )* };
+}
+
+words!(Heading, Mode, Pick);
+
 impl Value for bool {
     fn of(text: &str) -> Option<Self> {
         match text {
@@ -177,7 +194,7 @@ impl Value for Degrees {
     }
 }
 
-impl Value for Coord {
+impl Value for Node {
     fn of(text: &str) -> Option<Self> {
         let (x, y) = text.split_once(',')?;
         Some(Self {
@@ -191,16 +208,6 @@ impl Value for Coord {
     }
 }
 
-impl Value for Direction {
-    fn of(text: &str) -> Option<Self> {
-        Self::from_word(text)
-    }
-
-    fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{self}")
-    }
-}
-
 impl Value for Name {
     fn of(text: &str) -> Option<Self> {
         Self::new(text).ok()
@@ -211,29 +218,9 @@ impl Value for Name {
     }
 }
 
-impl Value for Mode {
-    fn of(text: &str) -> Option<Self> {
-        Self::from_word(text)
-    }
-
-    fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.as_str())
-    }
-}
-
-impl Value for Pick {
-    fn of(text: &str) -> Option<Self> {
-        Self::from_word(text)
-    }
-
-    fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.as_str())
-    }
-}
-
 impl Value for ProductId {
     fn of(text: &str) -> Option<Self> {
-        i32::of(text).and_then(Self::new)
+        product(text)
     }
 
     fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {

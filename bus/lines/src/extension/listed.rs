@@ -2,9 +2,11 @@
 
 use core::fmt;
 
+use lager_floor::{Node, Place, ProductId};
+
+use crate::floor::{Spelled, Words};
 use crate::misread::Misread;
 use crate::reader::Reader;
-use crate::warehouse::{Coord, Direction, ProductId};
 
 /// How many there are, and the first of them in one line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,16 +31,22 @@ macro_rules! listed {
             }
 
             pub(super) fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
-                Self::read_each(reader, <$item>::read)
+                read_each(reader)
+            }
+        }
+
+        impl fmt::Display for Listed<$item> {
+            fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write_each(self, formatter)
             }
         }
     };
 }
 
-listed!(Coord, 120);
+listed!(Node, 120);
 listed!(Block, 40);
 listed!(Queued, 45);
-listed!(Edge, 64);
+listed!(Place, 64);
 listed!(ProductId, 85);
 
 impl<T> Listed<T> {
@@ -51,79 +59,47 @@ impl<T> Listed<T> {
     pub fn first(&self) -> &[T] {
         &self.first
     }
+}
 
-    fn read_each(
-        reader: &mut Reader<'_>,
-        item: fn(&mut Reader<'_>) -> Result<T, Misread>,
-    ) -> Result<Self, Misread> {
-        let wanted = "their number from 0 to 4294967295";
-        let total = reader.word().number(wanted, 0, i64::from(u32::MAX))?;
-        let mut first = Vec::new();
-        while !reader.ahead().text.is_empty() {
-            if first.len() as u64 == u64::from(total) {
-                return Err(reader.ahead().misread("the end of the line"));
-            }
-            first.push(item(reader)?);
+fn read_each<T: Spelled>(reader: &mut Reader<'_>) -> Result<Listed<T>, Misread> {
+    let wanted = "their number from 0 to 4294967295";
+    let total = reader.word().number(wanted, 0, i64::from(u32::MAX))?;
+    let mut first = Vec::new();
+    while !reader.ahead().text.is_empty() {
+        if first.len() as u64 == u64::from(total) {
+            return Err(reader.ahead().misread("the end of the line"));
         }
-        Ok(Self { total, first })
+        first.push(T::read(reader)?);
     }
+    Ok(Listed { total, first })
 }
 
-impl<T: fmt::Display> fmt::Display for Listed<T> {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}", self.total)?;
-        self.first
-            .iter()
-            .try_for_each(|item| write!(formatter, " {item}"))
-    }
-}
-
-/// The way from a node to the next one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Edge {
-    /// The node.
-    pub node: Coord,
-    /// Which way.
-    pub way: Direction,
-}
-
-impl Edge {
-    pub(super) fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
-        Ok(Self {
-            node: Coord::read(reader)?,
-            way: Direction::read(reader)?,
-        })
-    }
-}
-
-impl fmt::Display for Edge {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} {}", self.node, self.way)
-    }
+fn write_each<T: Spelled>(listed: &Listed<T>, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(formatter, "{}", listed.total)?;
+    let mut first = listed.first.iter();
+    first.try_for_each(|item| write!(formatter, " {}", Words(item)))
 }
 
 /// A way that is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Block {
     /// The way.
-    pub edge: Edge,
+    pub way: Place,
     /// Since when, in s of the robot's clock, as `time_ms` of its state counts.
     pub since_s: u32,
 }
 
-impl Block {
+impl Spelled for Block {
     fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
         let wanted = "a time from 0 to 4294967295 s";
         Ok(Self {
-            edge: Edge::read(reader)?,
+            way: Place::read(reader)?,
             since_s: reader.word().number(wanted, 0, i64::from(u32::MAX))?,
         })
     }
-}
 
-impl fmt::Display for Block {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} {}", self.edge, self.since_s)
+    fn write(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} {}", Words(&self.way), self.since_s)
     }
 }
 
@@ -136,24 +112,16 @@ pub struct Queued {
     pub product: ProductId,
 }
 
-impl ProductId {
-    fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
-        Self::from_word(reader.word())
-    }
-}
-
-impl Queued {
+impl Spelled for Queued {
     fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
         let wanted = "an order from 0 to 4294967295";
         Ok(Self {
             order: reader.word().number(wanted, 0, i64::from(u32::MAX))?,
-            product: ProductId::from_word(reader.word())?,
+            product: ProductId::read(reader)?,
         })
     }
-}
 
-impl fmt::Display for Queued {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{} {}", self.order, self.product)
     }
 }

@@ -1,19 +1,44 @@
 //! Station to robot: stops and numbered actions.
+//!
+//! ```text
+//! <action> ::= order <order> <prodid>  fetch a product after those that wait
+//!            | cancel <order>          fetch it no more; refused once its goods are held
+//!            | first <order>           fetch it before those that wait
+//!            | up <order>              fetch it before the one that is now before it
+//!            | clear                   fetch none of those that wait
+//!            | back [<prodid>]         those goods, or all, are in their places again
+//!            | mode <mode>             who drives
+//!            | resume <stop>           end this stop, as `stop=` of the state tells it; refused
+//!                                      where another one was set meanwhile
+//!            | reset                   the robot stands on the delivery corner, looking inwards
+//!            | place <edge>            it stands on that node and looks that way; a simulated one
+//!                                      is put there
+//!            | pick manual|auto        who picks the goods up from now on: a person, or the robot
+//!            | picked [force]          the goods are in the gripper; force: felt or not
+//!            | drive <styrcomm> <ms>   the wheels, for 1 to 1000 ms from receipt
+//!            | arm <armcomm>           one step of the arm
+//!            | gains <int> <int>       of the error and of its change, each 0 to 255
+//!            | calibrate               the line sensors, on the tape under the robot
+//!            | horn                    the robot sounds its horn: it says so in a thought
+//!            | obstacle put <edge>     in a simulated world
+//!            | obstacle take <edge>
+//! <order>  ::= <int>                   0 to 4294967295, chosen by the station; 0 is refused
+//! <mode>   ::= manual | autonomous
+//! <edge>   ::= <coord> <direction>     from a node to the next one that way
+//! ```
 
 use core::fmt;
-use core::time::Duration;
 
-use lager_wire::{OperatorArm, OperatorCommand};
+use lager_floor::{Place, ProductId};
+use lager_orders::{Action, LeaseMs, Mode, Pick, Put};
+use lager_wire::OperatorCommand;
 use thiserror::Error;
 
 use super::fields::Value as _;
-use super::listed::Edge;
-use super::mode::{Mode, Pick};
-use crate::command::{Code, CommandError, Wheels, read_arm, read_wheels};
-use crate::late::{LATEST, LATEST_MOVE};
+use crate::command::{Code, CommandError, read_arm, read_wheels};
+use crate::floor::{Spelled as _, Words};
 use crate::misread::Misread;
 use crate::reader::{Reader, Word};
-use crate::warehouse::ProductId;
 
 /// What a station orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,136 +57,6 @@ pub enum Order {
         /// What to do.
         action: Action,
     },
-}
-
-/// What a station wants done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// `order`: fetch a product after those that wait (F3).
-    Add {
-        /// The number of the order, chosen by the station.
-        order: u32,
-        /// What to fetch.
-        product: ProductId,
-    },
-    /// `cancel`: fetch it no more.
-    Cancel {
-        /// The order.
-        order: u32,
-    },
-    /// `first`: fetch it before those that wait.
-    First {
-        /// The order.
-        order: u32,
-    },
-    /// `up`: fetch it before the one that is now before it.
-    Up {
-        /// The order.
-        order: u32,
-    },
-    /// `clear`: fetch none of those that wait.
-    Clear,
-    /// `mode`: who drives.
-    Mode(Mode),
-    /// `resume`: end a stop, and no other that was set meanwhile.
-    Resume {
-        /// Which, as [`State`](super::State) tells it.
-        stop: u64,
-    },
-    /// `reset`: the robot stands on the delivery corner and looks into the warehouse (B1).
-    Reset,
-    /// `place`: the robot stands on a crossing and looks along the grid; a simulated one is put
-    /// there.
-    Place(Edge),
-    /// `picked`: the goods are in the gripper (L7).
-    Picked {
-        /// Whether or not the gripper feels them.
-        force: bool,
-    },
-    /// `pick`: who picks the goods up from now on.
-    Pick(Pick),
-    /// `drive`: the wheels (G8).
-    Drive {
-        /// What they do.
-        wheels: Wheels,
-        /// For how long from the line's receipt on, unless it is renewed.
-        lease: LeaseMs,
-    },
-    /// `arm`: one step of the arm (G7).
-    Arm(OperatorArm),
-    /// `gains`: of the line control (E10).
-    Gains {
-        /// On the error, in the firmware's unit.
-        p: u8,
-        /// On the change of the error, in the firmware's unit.
-        d: u8,
-    },
-    /// `calibrate`: the line sensors, on the tape under the robot (E9).
-    Calibrate,
-    /// `obstacle`: put one on an edge of a simulated world, or take it away (E6).
-    Obstacle {
-        /// Which of the two.
-        put: Put,
-        /// Where.
-        edge: Edge,
-    },
-}
-
-impl Action {
-    /// How late it may come. A command to stand is never too late.
-    pub const fn latest(self) -> Duration {
-        match self {
-            Self::Drive { wheels, .. } if wheels.is_stop() => Duration::MAX,
-            Self::Drive { .. }
-            | Self::Arm(_)
-            | Self::Resume { .. }
-            | Self::Mode(_)
-            | Self::Picked { .. }
-            | Self::Reset
-            | Self::Place(_) => LATEST_MOVE,
-            _ => LATEST,
-        }
-    }
-}
-
-/// What becomes of an obstacle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Put {
-    /// It is put there.
-    Put,
-    /// It is taken away.
-    Take,
-}
-
-impl Put {
-    const fn as_str(self) -> &'static str {
-        match self {
-            Self::Put => "put",
-            Self::Take => "take",
-        }
-    }
-}
-
-/// How long a command to the wheels holds, in ms: 1 to 1000.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LeaseMs(u16);
-
-impl LeaseMs {
-    /// The longest, in ms.
-    pub const MAX: u16 = 1000;
-
-    /// A lease of `ms`, if it is from 1 to [`LeaseMs::MAX`].
-    pub const fn new(ms: u16) -> Option<Self> {
-        if ms == 0 || ms > Self::MAX {
-            return None;
-        }
-        Some(Self(ms))
-    }
-
-    /// The time in ms.
-    pub const fn get(self) -> u16 {
-        self.0
-    }
 }
 
 /// Why an order cannot be carried out.
@@ -274,7 +169,7 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
     let action = match word.text {
         "order" => Action::Add {
             order: number(&mut reader)?,
-            product: ProductId::from_word(reader.word())?,
+            product: ProductId::read(&mut reader)?,
         },
         "cancel" => Action::Cancel {
             order: number(&mut reader)?,
@@ -286,14 +181,22 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
             order: number(&mut reader)?,
         },
         "clear" => Action::Clear,
-        "mode" => Action::Mode(reader.word().read(Mode::WANTED, Mode::from_word)?),
+        "back" if reader.ahead().text.is_empty() => Action::Back { product: None },
+        "back" => Action::Back {
+            product: Some(ProductId::read(&mut reader)?),
+        },
+        "mode" => Action::Mode(
+            reader
+                .word()
+                .read("manual or autonomous", Mode::from_word)?,
+        ),
         "resume" => Action::Resume {
             stop: reader
                 .word()
                 .read("the number of the stop, as the state tells it", u64::of)?,
         },
         "reset" => Action::Reset,
-        "place" => Action::Place(Edge::read(&mut reader)?),
+        "place" => Action::Place(Place::read(&mut reader)?),
         "picked" => Action::Picked {
             force: reader
                 .word()
@@ -303,10 +206,12 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
                     _ => None,
                 })?,
         },
-        "pick" => Action::Pick(reader.word().read(Pick::WANTED, Pick::from_word)?),
+        "pick" => Action::Pick(reader.word().read("manual or auto", Pick::from_word)?),
         "drive" => Action::Drive {
             wheels: read_command(reader.word(), read_wheels)?,
-            lease: LeaseMs(reader.word().number("a time from 1 to 1000 ms", 1, 1000)?),
+            lease: reader.word().read("a time from 1 to 1000 ms", |word| {
+                u16::of(word).and_then(LeaseMs::new)
+            })?,
         },
         "arm" => Action::Arm(read_command(reader.word(), read_arm)?),
         "gains" => Action::Gains {
@@ -314,17 +219,18 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
             d: reader.word().number("a gain from 0 to 255", 0, 255)?,
         },
         "calibrate" => Action::Calibrate,
+        "horn" => Action::Horn,
         "obstacle" => Action::Obstacle {
             put: reader.word().read("put or take", |word| {
                 [Put::Put, Put::Take]
                     .into_iter()
                     .find(|put| put.as_str() == word)
             })?,
-            edge: Edge::read(&mut reader)?,
+            way: Place::read(&mut reader)?,
         },
         _ => {
-            let wanted = "one of order, cancel, first, up, clear, mode, resume, reset, place, \
-                          picked, pick, drive, arm, gains, calibrate and obstacle";
+            let wanted = "one of order, cancel, first, up, clear, back, mode, resume, reset, place, \
+                          picked, pick, drive, arm, gains, calibrate, horn and obstacle";
             return Err(word.misread(wanted).into());
         }
     };
@@ -350,36 +256,50 @@ impl fmt::Display for Order {
                 number,
                 late_ms: 0,
                 action,
-            } => write!(formatter, "do {number} {action}"),
+            } => write!(formatter, "do {number} {}", Spelled(action)),
             Self::Do {
                 number,
                 late_ms,
                 action,
-            } => write!(formatter, "do {number} late {late_ms} {action}"),
+            } => write!(formatter, "do {number} late {late_ms} {}", Spelled(action)),
         }
     }
 }
 
-impl fmt::Display for Action {
+/// An action as its words stand in a line.
+#[derive(Clone, Copy, Debug)]
+pub struct Spelled<'a>(pub &'a Action);
+
+impl fmt::Display for Spelled<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Add { order, product } => write!(formatter, "order {order} {product}"),
-            Self::Cancel { order } => write!(formatter, "cancel {order}"),
-            Self::First { order } => write!(formatter, "first {order}"),
-            Self::Up { order } => write!(formatter, "up {order}"),
-            Self::Clear => formatter.write_str("clear"),
-            Self::Mode(mode) => write!(formatter, "mode {}", mode.as_str()),
-            Self::Resume { stop } => write!(formatter, "resume {stop}"),
-            Self::Reset => formatter.write_str("reset"),
-            Self::Place(on) => write!(formatter, "place {on}"),
-            Self::Picked { force: false } => formatter.write_str("picked"),
-            Self::Picked { force: true } => formatter.write_str("picked force"),
-            Self::Pick(pick) => write!(formatter, "pick {}", pick.as_str()),
-            Self::Drive { wheels, lease } => write!(formatter, "drive {wheels} {}", lease.get()),
-            Self::Arm(step) => write!(formatter, "arm {}", Code(OperatorCommand::Arm(*step))),
-            Self::Gains { p, d } => write!(formatter, "gains {p} {d}"),
-            Self::Calibrate => formatter.write_str("calibrate"),
-            Self::Obstacle { put, edge } => write!(formatter, "obstacle {} {edge}", put.as_str()),
+        match self.0 {
+            Action::Add { order, product } => write!(formatter, "order {order} {product}"),
+            Action::Cancel { order } => write!(formatter, "cancel {order}"),
+            Action::First { order } => write!(formatter, "first {order}"),
+            Action::Up { order } => write!(formatter, "up {order}"),
+            Action::Clear => formatter.write_str("clear"),
+            Action::Back { product: None } => formatter.write_str("back"),
+            Action::Back {
+                product: Some(product),
+            } => write!(formatter, "back {product}"),
+            Action::Mode(mode) => write!(formatter, "mode {}", mode.as_str()),
+            Action::Resume { stop } => write!(formatter, "resume {stop}"),
+            Action::Reset => formatter.write_str("reset"),
+            Action::Place(on) => write!(formatter, "place {}", Words(on)),
+            Action::Picked { force: false } => formatter.write_str("picked"),
+            Action::Picked { force: true } => formatter.write_str("picked force"),
+            Action::Pick(pick) => write!(formatter, "pick {}", pick.as_str()),
+            Action::Drive { wheels, lease } => {
+                let code = Code(OperatorCommand::from(*wheels));
+                write!(formatter, "drive {code} {}", lease.get())
+            }
+            Action::Arm(step) => write!(formatter, "arm {}", Code(OperatorCommand::Arm(*step))),
+            Action::Gains { p, d } => write!(formatter, "gains {p} {d}"),
+            Action::Calibrate => formatter.write_str("calibrate"),
+            Action::Horn => formatter.write_str("horn"),
+            Action::Obstacle { put, way } => {
+                write!(formatter, "obstacle {} {}", put.as_str(), Words(way))
+            }
         }
     }
 }

@@ -2,17 +2,19 @@
 
 use core::fmt;
 
+use lager_floor::{Node, Place, ProductId};
+use lager_orders::Reason;
 use lager_wire::LineReading;
 
 use super::fields::Degrees;
-use super::listed::{Block, Edge, Listed, Queued};
+use super::listed::{Block, Listed, Queued};
 use super::order::number;
 use super::state::State;
 use super::thinks::Thinks;
+use crate::floor::{Spelled as _, Words};
 use crate::misread::Misread;
 use crate::reader::Reader;
 use crate::text::Text;
-use crate::warehouse::{Coord, ProductId};
 
 /// What a robot tells.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,18 +37,18 @@ pub enum Report {
         /// Its number.
         number: u32,
         /// Why.
-        reason: Text,
+        reason: Reason,
     },
     /// What it is doing. Boxed: it is much larger than all others.
     State(Box<State>),
     /// The nodes of its way, the next one first.
-    Route(Listed<Coord>),
+    Route(Listed<Node>),
     /// Ways that it does not take.
     Blocked(Listed<Block>),
     /// What it fetches next, in this order.
     Queue(Listed<Queued>),
     /// What stands on ways of a simulated world.
-    Obstacles(Listed<Edge>),
+    Obstacles(Listed<Place>),
     /// Products whose goods are not in their place: delivered, or not found there.
     Gone(Listed<ProductId>),
     /// Something has happened.
@@ -60,6 +62,8 @@ pub enum Report {
     },
     /// The thought that comes next, in values.
     Thinks(Box<Thinks>),
+    /// Why it says the thought that comes next.
+    Because(Reason),
     /// How long it takes to react.
     Latency(Box<Latency>),
     /// Where a simulated robot really is.
@@ -74,7 +78,7 @@ pub struct Event {
     /// What.
     pub kind: EventKind,
     /// The node last passed; with `next_node` the one to which the robot goes.
-    pub node: Coord,
+    pub node: Node,
     /// The order it belongs to.
     pub order: Option<u32>,
     /// The product of that order.
@@ -229,18 +233,19 @@ impl Report {
             "refused" => |reader: &mut Reader<'_>| {
                 Ok(Self::Refused {
                     number: number(reader)?,
-                    reason: reader.rest_as_text()?,
+                    reason: read_reason(reader)?,
                 })
             },
             "state" => |reader: &mut Reader<'_>| Ok(Self::State(Box::new(State::read(reader)?))),
             "thinks" => |reader: &mut Reader<'_>| Ok(Self::Thinks(Box::new(Thinks::read(reader)?))),
-            "route" => |reader: &mut Reader<'_>| Ok(Self::Route(Listed::<Coord>::read(reader)?)),
+            "because" => |reader: &mut Reader<'_>| read_reason(reader).map(Self::Because),
+            "route" => |reader: &mut Reader<'_>| Ok(Self::Route(Listed::<Node>::read(reader)?)),
             "blocked" => {
                 |reader: &mut Reader<'_>| Ok(Self::Blocked(Listed::<Block>::read(reader)?))
             }
             "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
             "obstacles" => {
-                |reader: &mut Reader<'_>| Ok(Self::Obstacles(Listed::<Edge>::read(reader)?))
+                |reader: &mut Reader<'_>| Ok(Self::Obstacles(Listed::<Place>::read(reader)?))
             }
             "gone" => |reader: &mut Reader<'_>| Ok(Self::Gone(Listed::<ProductId>::read(reader)?)),
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
@@ -254,6 +259,10 @@ impl Report {
         };
         Some(read(&mut reader).and_then(|report| reader.end().map(|()| report)))
     }
+}
+
+fn read_reason(reader: &mut Reader<'_>) -> Result<Reason, Misread> {
+    Ok(Reason::read(reader.rest_as_text()?.as_str()))
 }
 
 fn read_stopped(reader: &mut Reader<'_>) -> Result<Report, Misread> {
@@ -318,9 +327,9 @@ impl Event {
                       link_lost and link_back";
         Ok(Self {
             kind: reader.word().read(wanted, EventKind::from_word)?,
-            node: Coord::read(reader)?,
+            node: Node::read(reader)?,
             order: read_or_dash(reader, number)?,
-            product: read_or_dash(reader, |reader| ProductId::from_word(reader.word()))?,
+            product: read_or_dash(reader, ProductId::read)?,
             text: reader.rest_as_text()?,
         })
     }
@@ -355,7 +364,7 @@ impl TruePose {
             x_mm: way()?,
             y_mm: way()?,
             heading: reader.word().read(Degrees::WANTED, Degrees::of)?,
-            carrying: read_or_dash(reader, |reader| ProductId::from_word(reader.word()))?,
+            carrying: read_or_dash(reader, ProductId::read)?,
         })
     }
 }
@@ -377,16 +386,19 @@ impl fmt::Display for Report {
         match self {
             Self::Stopped { number, after_ms } => write!(formatter, "stopped {number} {after_ms}"),
             Self::Done { number } => write!(formatter, "done {number}"),
-            Self::Refused { number, reason } => write!(formatter, "refused {number} {reason}"),
+            Self::Refused { number, reason } => {
+                write!(formatter, "refused {number} {}", reason.as_str())
+            }
             Self::State(state) => write!(formatter, "state{state}"),
             Self::Route(nodes) => write!(formatter, "route {nodes}"),
             Self::Blocked(ways) => write!(formatter, "blocked {ways}"),
             Self::Queue(orders) => write!(formatter, "queue {orders}"),
-            Self::Obstacles(edges) => write!(formatter, "obstacles {edges}"),
+            Self::Obstacles(ways) => write!(formatter, "obstacles {ways}"),
             Self::Gone(products) => write!(formatter, "gone {products}"),
             Self::Event(event) => write!(formatter, "event {event}"),
             Self::Past { ago_ms, report } => write!(formatter, "past {ago_ms} {report}"),
             Self::Thinks(thinks) => write!(formatter, "thinks{thinks}"),
+            Self::Because(reason) => write!(formatter, "because {}", reason.as_str()),
             Self::Latency(latency) => write!(formatter, "latency {latency}"),
             Self::Truth(truth) => write!(formatter, "truth {truth}"),
             Self::Sensors(sensors) => {
@@ -417,7 +429,12 @@ impl fmt::Display for Event {
             text,
         } = self;
         let (order, product) = (OrDash(*order), OrDash(*product));
-        write!(formatter, "{} {node} {order} {product}", kind.as_str())?;
+        write!(
+            formatter,
+            "{} {} {order} {product}",
+            kind.as_str(),
+            Words(node)
+        )?;
         if !text.as_str().is_empty() {
             write!(formatter, " {text}")?;
         }

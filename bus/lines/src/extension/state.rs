@@ -4,12 +4,12 @@
 //! state time_ms=81250 x_mm=400 y_mm=0 heading_deg=90 node=1,0 looks=right phase=driving
 //! ```
 
+use lager_floor::{Heading, Node, ProductId};
+use lager_orders::{Mode, Pick};
 use lager_wire::{Binary, LineBits};
 
 use super::fields::{Degrees, Loads, Servos, fields};
-use super::mode::{Mode, Pick};
 use crate::text::Name;
-use crate::warehouse::{Coord, Direction, ProductId};
 
 fields! {
     /// What the robot is doing. `None` is not known.
@@ -25,11 +25,11 @@ fields! {
         /// How far the axle may be from there: odometry's error grows until the next mark.
         unsure_mm: u32 = "a way from 0 to 4294967295 mm",
         /// The node last passed.
-        node: Coord = "a node such as 2,1",
+        node: Node = "a node such as 2,1",
         /// Where the robot looks along the grid.
-        looks: Direction = "left, up, right or down",
+        looks: Heading = "left, up, right or down",
         /// The node it goes to.
-        next: Coord = "a node such as 2,1",
+        next: Node = "a node such as 2,1",
         /// What it does, by the names of the phases of `nav/status`, such as `driving`.
         phase: Name = "a name of 1 to 32 of a-z, 0-9, - and _",
         /// Why it stands although it would drive, likewise.

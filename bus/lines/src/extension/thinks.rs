@@ -5,9 +5,10 @@
 //! thought Crossing (2, 1), 3 to go.
 //! ```
 
+use lager_floor::{Heading, Node, ProductId};
+
 use super::fields::fields;
 use crate::text::Name;
-use crate::warehouse::{Coord, Direction, ProductId};
 
 fields! {
     /// A thought in values. `None` is not part of it.
@@ -15,9 +16,9 @@ fields! {
         /// What is thought, by the names of `log/thought`, such as `node_passed`.
         kind: Name = "a name of 1 to 32 of a-z, 0-9, - and _",
         /// The node it is about.
-        node: Coord = "a node such as 2,1",
+        node: Node = "a node such as 2,1",
         /// The direction it is about.
-        looks: Direction = "left, up, right or down",
+        looks: Heading = "left, up, right or down",
         /// The joint of the arm it is about, such as `elbow`.
         joint: Name = "a name of 1 to 32 of a-z, 0-9, - and _",
         /// The sides of a mark: bit 0 is left, bit 1 right.
@@ -31,7 +32,7 @@ fields! {
         /// What is wrong, by the names of `nav/status`, such as `line_lost`.
         failure: Name = "a name of 1 to 32 of a-z, 0-9, - and _",
         /// The node near which that is.
-        failure_node: Coord = "a node such as 2,1",
+        failure_node: Node = "a node such as 2,1",
         /// What was expected, as the failure means it.
         failure_expected: i32 = "a number from -2147483648 to 2147483647",
         /// What was seen, likewise.

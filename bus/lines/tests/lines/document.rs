@@ -1,8 +1,9 @@
 //! The examples and tables of the technical documentation, word by word (3.3.1 to 3.3.4, 3.3.7).
 
+use lager_floor::{Heading, Node, Product, ProductId, SideLength};
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Goods, map_string, read_map};
-use lager_lines::{Coord, Direction, Product, ProductId, Products, SideLength, Text, to_line};
+use lager_lines::{Products, Text, to_line};
 use lager_wire::{ArmCommand, OperatorArm, OperatorCommand};
 
 /// 3.3.7, "Styrkommando": number, value, what it does. The labels of 3 and 5 are exchanged there
@@ -33,11 +34,11 @@ const ARM: [(&str, &str, ArmCommand); 10] = [
     ("FA", "11111010", ArmCommand::Release),
 ];
 
-fn coord(x: u8, y: u8) -> Coord {
-    Coord { x, y }
+fn coord(x: u8, y: u8) -> Node {
+    Node { x, y }
 }
 
-fn product(id: i32, x: u8, y: u8, side: Direction) -> Product {
+fn product(id: i32, x: u8, y: u8, side: Heading) -> Product {
     Product {
         id: ProductId::new(id).expect("a number"),
         square: coord(x, y),
@@ -75,8 +76,8 @@ fn sidelength_tells_centimetres() {
 #[test]
 fn prodlis_lists_stations() {
     let products = Products::new(vec![
-        product(7, 1, 0, Direction::Down),
-        product(12, 0, 1, Direction::Left),
+        product(7, 1, 0, Heading::Down),
+        product(12, 0, 1, Heading::Left),
     ])
     .expect("products");
     for (word, name) in [
@@ -145,10 +146,10 @@ fn telemetry_is_not_answered() {
     for (line, telemetry) in [
         ("thought any string", Telemetry::Thought(text("any string"))),
         ("set_robot 2 1", Telemetry::Robot(coord(2, 1))),
-        ("set_heading left", Telemetry::Heading(Direction::Left)),
-        ("set_heading up", Telemetry::Heading(Direction::Up)),
-        ("set_heading right", Telemetry::Heading(Direction::Right)),
-        ("set_heading down", Telemetry::Heading(Direction::Down)),
+        ("set_heading left", Telemetry::Heading(Heading::Left)),
+        ("set_heading up", Telemetry::Heading(Heading::Up)),
+        ("set_heading right", Telemetry::Heading(Heading::Right)),
+        ("set_heading down", Telemetry::Heading(Heading::Down)),
     ] {
         assert_eq!(Request::read(line), Ok(Request::Telemetry(telemetry)));
     }
@@ -175,10 +176,10 @@ fn the_goods_string_numbers_sides_clockwise_from_the_left() {
     let goods = Goods::read("1,0,0,0;2,1,0,1;3,0,1,2;4,1,1,3;").expect("goods");
     let products = goods.products().expect("numbers");
     let expected = [
-        product(1, 0, 0, Direction::Left),
-        product(2, 1, 0, Direction::Up),
-        product(3, 0, 1, Direction::Right),
-        product(4, 1, 1, Direction::Down),
+        product(1, 0, 0, Heading::Left),
+        product(2, 1, 0, Heading::Up),
+        product(3, 0, 1, Heading::Right),
+        product(4, 1, 1, Heading::Down),
     ];
     assert_eq!(products.as_slice(), expected);
     assert_eq!(Goods::from(&products), goods);

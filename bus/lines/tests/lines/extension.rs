@@ -1,11 +1,12 @@
 //! The extension: every line of it, and that lists and states always fit.
 
+use lager_floor::{Heading, Node, Place, ProductId};
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Action, Block, Degrees, Edge, Hello, LeaseMs, Listed, Loads, Mode, Order, Pick, Queued, Report,
-    Servos, State,
+    Block, Degrees, Hello, Listed, Loads, Order, Queued, Report, Servos, State,
 };
-use lager_lines::{Coord, Direction, Name, ProductId, to_line};
+use lager_lines::{Name, to_line};
+use lager_orders::{Action, LeaseMs, Mode, Pick};
 use lager_wire::{Binary, LineBits};
 
 #[test]
@@ -115,7 +116,7 @@ fn a_state_may_have_fields_that_are_not_known_here() {
 #[test]
 fn the_fullest_state_fits_in_a_line() {
     let name = || Name::new("x".repeat(Name::MAX_LENGTH)).ok();
-    let node = Some(Coord { x: 255, y: 255 });
+    let node = Some(Node { x: 255, y: 255 });
     let full = State {
         time_ms: Some(u64::MAX),
         x_mm: Some(i32::MIN),
@@ -123,7 +124,7 @@ fn the_fullest_state_fits_in_a_line() {
         heading_deg: Some(Degrees::new(-1)),
         unsure_mm: Some(u32::MAX),
         node,
-        looks: Some(Direction::Right),
+        looks: Some(Heading::Right),
         next: node,
         phase: name(),
         hold: name(),
@@ -171,27 +172,27 @@ fn a_thought_is_told_in_values() {
         panic!("a thought");
     };
     assert_eq!(thinks.kind, Name::new("node_passed").ok());
-    assert_eq!(thinks.node, Some(Coord { x: 2, y: 1 }));
+    assert_eq!(thinks.node, Some(Node { x: 2, y: 1 }));
     assert_eq!(Report::Thinks(thinks).to_string(), line);
     assert!(Report::read("thinks sides=256").is_some_and(|read| read.is_err()));
 }
 
 #[test]
 fn the_longest_lists_fit_in_a_line_and_tell_how_many_there_are() {
-    let node = Coord { x: 255, y: 255 };
-    let way = Direction::Right;
+    let node = Node { x: 255, y: 255 };
+    let heading = Heading::Right;
     let product = ProductId::new(i32::MAX).expect("a number");
     let queued = Queued {
         order: u32::MAX,
         product,
     };
-    let route = Listed::<Coord>::new(&vec![node; 512]);
+    let route = Listed::<Node>::new(&vec![node; 512]);
     assert_eq!(
         (route.total(), route.first().len()),
-        (512, Listed::<Coord>::FIT)
+        (512, Listed::<Node>::FIT)
     );
     let block = Block {
-        edge: Edge { node, way },
+        way: Place::new(node, heading),
         since_s: u32::MAX,
     };
     let blocked = Listed::<Block>::new(&vec![block; 512]);

@@ -2,11 +2,12 @@
 
 use std::fmt::{Debug, Display};
 
+use lager_floor::Grid;
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::gag::{Answer, Request};
 use lager_lines::splitter::{LineError, LineSplitter};
 use lager_lines::strings::{Goods, map_string, read_map};
-use lager_lines::{MAX_LINE, Map, to_line};
+use lager_lines::{MAX_LINE, to_line};
 
 /// Splits `bytes`, reads every line as everything, and panics where a law is broken. Tells how many
 /// lines were read as something and how many as nothing.
@@ -57,7 +58,7 @@ fn reads(line: &str) -> bool {
 
 /// A map as its string.
 #[derive(Debug, PartialEq)]
-struct MapText(Map);
+struct MapText(Grid);
 
 impl Display for MapText {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -31,13 +31,13 @@ fn word(column: usize, found: &str, wanted: &str) -> String {
 /// A delivery in a warehouse of 4 x 3 squares.
 fn no_corner(column: usize, delivery: &str) -> String {
     format!(
-        "column {column}: {delivery} is no corner of the warehouse; \
-         the delivery is at (0, 0), (0, 3), (4, 0) or (4, 3)"
+        "column {column}: the delivery is at {delivery}, which is no corner of the floor; \
+         its corners are (0, 0), (0, 3), (4, 0) and (4, 3)"
     )
 }
 
 fn no_squares(column: usize, size: &str) -> String {
-    format!("column {column}: a warehouse of {size} squares has none; each must be from 1 to 255")
+    format!("column {column}: the size is {size} squares; each must be from 1 to 99")
 }
 
 fn not_of_arm(column: usize, code: u8) -> String {
@@ -75,7 +75,7 @@ const WAY: &str = "left, up, right or down";
 const X: &str = "an x from 0 to 255";
 const Y: &str = "a y from 0 to 255";
 const NAME: &str = "a name of 1 to 32 of a-z, 0-9, - and _";
-const CM: &str = "a side of 1 to 65535 cm";
+const CM: &str = "a side of 40 to 500 cm";
 const LEASE: &str = "a time from 1 to 1000 ms";
 const SQUARE_X: &str = "the x of its square, 0 to 255";
 const SERVOS: &str = "a row of eight positions from 0 to 1023 or - with commas between";
@@ -86,15 +86,15 @@ const END_OF_MAP: &str = "the end of the map behind its fourth number";
 const TEXT: &str = "a text without a line break";
 const COUNT: &str = "the number of the products that follow";
 const DELIVERY_Y: &str = "the y of the delivery, 0 to 255";
-const WIDTH: &str = "a width of 1 to 255 squares";
+const WIDTH: &str = "a width of 1 to 99 squares";
 const SIDE: &str = "a side from 0 to 3";
 const VERSION: &str = "a version from 1 to 255";
 const REQUEST: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, styrcomm, \
                        thought, set_robot and set_heading";
 const ANSWER: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, styrcomm \
                       and pickup_done";
-const ACTION: &str = "one of order, cancel, first, up, clear, mode, resume, reset, place, \
-                      picked, pick, drive, arm, gains, calibrate and obstacle";
+const ACTION: &str = "one of order, cancel, first, up, clear, back, mode, resume, reset, place, \
+                      picked, pick, drive, arm, gains, calibrate, horn and obstacle";
 const EVENT: &str = "one of in_position, getting_item, item_delivered, next_node, refused, \
                      pickup_refused, failed, way_blocked, stopped, resumed, mode, restarted, \
                      link_lost and link_back";
@@ -152,7 +152,8 @@ fn answers_that_are_none() {
         ("kartan 1 1 0 0", word(1, "kartan", ANSWER)),
         ("set_robot 1 1", word(1, "set_robot", ANSWER)),
         ("sidelength", ends(11, CM)),
-        ("sidelength 0", word(12, "0", CM)),
+        ("sidelength 39", word(12, "39", CM)),
+        ("sidelength 501", word(12, "501", CM)),
         ("sidelength 65536", word(12, "65536", CM)),
         ("sidelength 40cm", word(12, "40cm", CM)),
         ("sidelength 40.5", word(12, "40.5", CM)),
@@ -219,7 +220,7 @@ fn strings_that_are_none() {
         &[
             ("", ends(1, WIDTH)),
             ("4,3,0", ends(6, DELIVERY_Y)),
-            ("4,,0,0", nothing(3, "a height of 1 to 255 squares")),
+            ("4,,0,0", nothing(3, "a height of 1 to 99 squares")),
             ("4,3,0,", ends(7, DELIVERY_Y)),
             ("4 3 0 0", word(1, "4 3 0 0", WIDTH)),
             ("4,3,0,0,0", word(9, "0", END_OF_MAP)),

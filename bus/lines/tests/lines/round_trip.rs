@@ -1,27 +1,26 @@
 //! What is written is read as the same, for any values at all.
 
-use lager_lines::command::Wheels;
+use lager_floor::{Grid, Heading, Node, Place, Product, ProductId, SideLength};
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Action, Block, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Loads, Mode,
-    Order, Pick, Put, Queued, Report, Servos, State, Thinks, TruePose,
+    Block, Degrees, Event, EventKind, Hello, Latency, Listed, Loads, Order, Queued, Report, Servos,
+    State, Thinks, TruePose,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
-use lager_lines::{
-    Coord, Direction, Map, Name, Product, ProductId, Products, SideLength, Text, to_line,
-};
+use lager_lines::{Name, Products, Text, to_line};
+use lager_orders::{Action, LeaseMs, Mode, Pick, Put, Reason, Wheels};
 use lager_wire::{Binary, LineBits, LineReading, OperatorArm, OperatorCommand};
 use proptest::option::of;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-fn coord() -> impl Strategy<Value = Coord> {
-    (any::<u8>(), any::<u8>()).prop_map(|(x, y)| Coord { x, y })
+fn coord() -> impl Strategy<Value = Node> {
+    (any::<u8>(), any::<u8>()).prop_map(|(x, y)| Node { x, y })
 }
 
-fn direction() -> impl Strategy<Value = Direction> {
-    select(&Direction::ALL)
+fn direction() -> impl Strategy<Value = Heading> {
+    select(&Heading::ALL)
 }
 
 fn product_id() -> impl Strategy<Value = ProductId> {
@@ -36,13 +35,13 @@ fn name() -> impl Strategy<Value = Name> {
     "[a-z0-9_-]{1,32}".prop_map(|name| Name::new(name).expect("a name"))
 }
 
-fn map() -> impl Strategy<Value = Map> {
-    (1..=255_u8, 1..=255_u8, any::<bool>(), any::<bool>()).prop_map(|(x, y, right, top)| {
-        let delivery = Coord {
+fn map() -> impl Strategy<Value = Grid> {
+    (1..=99_u8, 1..=99_u8, any::<bool>(), any::<bool>()).prop_map(|(x, y, right, top)| {
+        let delivery = Node {
             x: if right { x } else { 0 },
             y: if top { y } else { 0 },
         };
-        Map::new(Coord { x, y }, delivery).expect("a corner")
+        Grid::new(Node { x, y }, delivery).expect("a corner")
     })
 }
 
@@ -82,7 +81,7 @@ fn request() -> impl Strategy<Value = Request> {
 fn answer() -> impl Strategy<Value = Answer> {
     let word = select(&[ListWord::Prodlis, ListWord::Prodlist]);
     prop_oneof![
-        (1..=u16::MAX).prop_map(|cm| Answer::SideLength(SideLength::new(cm).expect("not 0"))),
+        (40..=500_u16).prop_map(|cm| Answer::SideLength(SideLength::new(cm).expect("a side"))),
         map().prop_map(Answer::Map),
         (word, products()).prop_map(|(word, products)| Answer::Products(word, products)),
         product_id().prop_map(Answer::Fetch),
@@ -92,11 +91,11 @@ fn answer() -> impl Strategy<Value = Answer> {
 }
 
 fn block() -> impl Strategy<Value = Block> {
-    (edge(), any::<u32>()).prop_map(|(edge, since_s)| Block { edge, since_s })
+    (way(), any::<u32>()).prop_map(|(way, since_s)| Block { way, since_s })
 }
 
-fn edge() -> impl Strategy<Value = Edge> {
-    (coord(), direction()).prop_map(|(node, way)| Edge { node, way })
+fn way() -> impl Strategy<Value = Place> {
+    (coord(), direction()).prop_map(|(node, heading)| Place::new(node, heading))
 }
 
 fn mode() -> impl Strategy<Value = Mode> {
@@ -118,15 +117,17 @@ fn action() -> impl Strategy<Value = Action> {
         mode().prop_map(Action::Mode),
         any::<u64>().prop_map(|stop| Action::Resume { stop }),
         Just(Action::Reset),
-        edge().prop_map(Action::Place),
+        way().prop_map(Action::Place),
         any::<bool>().prop_map(|force| Action::Picked { force }),
         pick().prop_map(Action::Pick),
         (wheels(), lease).prop_map(|(wheels, lease)| Action::Drive { wheels, lease }),
         arm().prop_map(Action::Arm),
         any::<(u8, u8)>().prop_map(|(p, d)| Action::Gains { p, d }),
         Just(Action::Calibrate),
-        (select(&[Put::Put, Put::Take]), edge())
-            .prop_map(|(put, edge)| Action::Obstacle { put, edge }),
+        Just(Action::Horn),
+        of(product_id()).prop_map(|product| Action::Back { product }),
+        (select(&[Put::Put, Put::Take]), way())
+            .prop_map(|(put, way)| Action::Obstacle { put, way }),
     ]
 }
 
@@ -263,17 +264,20 @@ fn report() -> impl Strategy<Value = Report> {
     prop_oneof![
         any::<(u32, u32)>().prop_map(|(number, after_ms)| Report::Stopped { number, after_ms }),
         any::<u32>().prop_map(|number| Report::Done { number }),
-        (any::<u32>(), text()).prop_map(|(number, reason)| Report::Refused { number, reason }),
+        (any::<u32>(), text()).prop_map(|(number, reason)| Report::Refused {
+            number,
+            reason: Reason::read(reason.as_str()),
+        }),
         state().prop_map(|state| Report::State(Box::new(state))),
         thinks().prop_map(|thinks| Report::Thinks(Box::new(thinks))),
         prop::collection::vec(coord(), many.clone())
-            .prop_map(|all| Report::Route(Listed::<Coord>::new(&all))),
+            .prop_map(|all| Report::Route(Listed::<Node>::new(&all))),
         prop::collection::vec(block(), many.clone())
             .prop_map(|all| Report::Blocked(Listed::<Block>::new(&all))),
         prop::collection::vec(queued, many.clone())
             .prop_map(|all| Report::Queue(Listed::<Queued>::new(&all))),
-        prop::collection::vec(edge(), 0..200_usize)
-            .prop_map(|all| Report::Obstacles(Listed::<Edge>::new(&all))),
+        prop::collection::vec(way(), 0..200_usize)
+            .prop_map(|all| Report::Obstacles(Listed::<Place>::new(&all))),
         event(),
         past(),
         prop::collection::vec(product_id(), many)

@@ -1,82 +1,11 @@
 //! The values that lines carry, and what cannot be one.
 
-use lager_lines::command::{CommandError, Wheels, read_arm, read_wheels};
+use lager_floor::{Heading, Node, ProductId};
+use lager_lines::command::{CommandError, read_arm, read_wheels};
 use lager_lines::strings::Good;
-use lager_lines::{
-    Coord, Direction, Map, MapError, Name, NameError, Product, ProductId, Products, ProductsError,
-    SideLength, Text, TextError, TooLong, to_line,
-};
+use lager_lines::{Name, NameError, Text, TextError, TooLong, to_line};
+use lager_orders::Wheels;
 use lager_wire::{CodeTextError, OperatorCommand};
-
-#[test]
-fn the_four_corners_and_nothing_else_deliver() {
-    let size = Coord { x: 3, y: 2 };
-    let mut corners = Vec::new();
-    for (x, y) in (0..=4).flat_map(|x| (0..=4).map(move |y| (x, y))) {
-        let delivery = Coord { x, y };
-        match Map::new(size, delivery) {
-            Ok(map) => corners.push((map.delivery().x, map.delivery().y)),
-            Err(error) => assert_eq!(error, MapError::Delivery { size, delivery }),
-        }
-    }
-    assert_eq!(corners, [(0, 0), (0, 2), (3, 0), (3, 2)]);
-}
-
-#[test]
-fn a_warehouse_has_squares() {
-    for (x, y) in [(0, 0), (0, 5), (5, 0)] {
-        let size = Coord { x, y };
-        assert_eq!(
-            Map::new(size, Coord { x: 0, y: 0 }),
-            Err(MapError::Empty { size })
-        );
-    }
-    let largest = Coord { x: 255, y: 255 };
-    assert!(Map::new(largest, largest).is_ok());
-}
-
-fn product(id: i32, x: u8, y: u8) -> Product {
-    Product {
-        id: ProductId::new(id).expect("a number"),
-        square: Coord { x, y },
-        side: Direction::Up,
-    }
-}
-
-#[test]
-fn products_have_numbers_of_their_own_and_squares_on_the_map() {
-    let twice = Products::new(vec![product(1, 0, 0), product(2, 0, 0), product(1, 1, 1)]);
-    let id = ProductId::new(1).expect("a number");
-    assert_eq!(twice, Err(ProductsError::Twice { id, index: 2 }));
-
-    let map = Map::new(Coord { x: 2, y: 1 }, Coord { x: 0, y: 0 }).expect("a map");
-    let inside = Products::new(vec![product(1, 0, 0), product(2, 1, 0)]).expect("products");
-    assert_eq!(inside.outside(map), None);
-    for (x, y) in [(2, 0), (0, 1), (255, 255)] {
-        let outside = Products::new(vec![product(1, 0, 0), product(2, x, y)]).expect("products");
-        assert_eq!(outside.outside(map), Some(&product(2, x, y)));
-    }
-}
-
-#[test]
-fn numbers_have_their_ranges() {
-    assert_eq!(SideLength::new(0), None);
-    assert_eq!(SideLength::new(40).map(SideLength::cm), Some(40));
-    assert_eq!(ProductId::new(-1), None);
-    assert_eq!(ProductId::new(i32::MAX).map(ProductId::get), Some(i32::MAX));
-}
-
-#[test]
-fn directions_are_numbered_clockwise_from_the_left() {
-    let numbers = Direction::ALL.map(Direction::number);
-    assert_eq!(numbers, [0, 1, 2, 3]);
-    let words = Direction::ALL.map(Direction::as_str);
-    assert_eq!(words, ["left", "up", "right", "down"]);
-    for direction in Direction::ALL {
-        assert_eq!(Direction::from_number(direction.number()), Some(direction));
-    }
-    assert_eq!(Direction::from_number(4), None);
-}
 
 #[test]
 fn texts_have_no_line_breaks_and_names_few_characters() {
@@ -107,14 +36,14 @@ fn texts_have_no_line_breaks_and_names_few_characters() {
 
 #[test]
 fn labels_of_goods_do_not_break_their_string() {
-    let square = Coord { x: 0, y: 0 };
+    let square = Node { x: 0, y: 0 };
     for label in ["", "a,b", "a;b", "a\nb", " a", "a\t"] {
-        let error = Good::new(label, square, Direction::Left).expect_err(label);
+        let error = Good::new(label, square, Heading::Left).expect_err(label);
         assert_eq!(error.label, label);
     }
-    let named = Good::new("röda skruvar", square, Direction::Left).expect("a label");
+    let named = Good::new("röda skruvar", square, Heading::Left).expect("a label");
     assert_eq!((named.label(), named.id()), ("röda skruvar", None));
-    let numbered = Good::new("12", square, Direction::Left).expect("a label");
+    let numbered = Good::new("12", square, Heading::Left).expect("a label");
     assert_eq!(numbered.id(), ProductId::new(12));
 }
 

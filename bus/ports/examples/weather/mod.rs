@@ -1,6 +1,6 @@
-//! A payload and a topic of a user's own; what a crate of his would define.
+//! The examples' own application: a payload, a topic, and the part that the topic wakes.
 
-use lager_topics::{Qos, Role, Topic, payload};
+use lager_sample::{Application, Part, Qos, Topic, payload};
 
 payload! {
     /// What a weather station sees.
@@ -14,13 +14,20 @@ payload! {
     }
 }
 
-/// `weather/now`, which wakes the processes that act on it.
+/// The part of a process that acts on the weather.
+pub(crate) const SAILOR: Part = Part::new(13, "sailor");
+
+/// The topic `weather/now`, which wakes the sailors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WeatherNow;
 
 impl Topic for WeatherNow {
     const NAME: &'static str = "weather/now";
     type Payload = Weather;
-    const QOS: Qos = Qos::stream(16).waking(&[Role::Guest]);
+    const QOS: Qos = Qos::stream(16).waking(&[SAILOR]);
     const SUMMARY: &'static str = "The weather, ten times a second.";
 }
+
+/// Its names begin with `lager`, like a robot's, so that `lager topic` shows them. The robot uses
+/// the parts 0 to 11. An application without a robot chooses its own names and numbers.
+pub(crate) static WEATHER: Application = Application::new("lager");

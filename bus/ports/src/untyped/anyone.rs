@@ -1,15 +1,15 @@
-//! Whether anybody reads a service, or listens on one, asked for every sample.
+//! [`Anyone`]: whether a service has any reader or listener. Writers ask this for every sample.
 //!
-//! To count the ports of a service, iceoryx2 passes over all their places: the 74 of a topic's
-//! readers and the 16 of its listeners took 600 of the 2 957 instructions of `publish/to-1`. Beside
-//! the places lies a number that changes whenever a port has come or gone, by which iceoryx2's own
-//! ports notice that. So the ports are counted when that number has changed, and only then.
+//! To count a service's ports, iceoryx2 visits all their places. The 74 places of a topic's readers
+//! and the 16 of its listeners took 600 of the 2 957 instructions of `publish/to-1`. Beside the
+//! places lies a number that changes whenever a port comes or goes, which iceoryx2's own ports also
+//! use. So this file counts the ports only when that number has changed.
 //!
-//! **Invariant:** a port that its owner has is seen. iceoryx2 changes the number when the port has
-//! its place, before it hands the port to its owner.
+//! **Invariant:** a port that its owner can use is always seen. iceoryx2 changes the number when
+//! the port has its place, before it hands the port to its owner.
 //!
 //! The list of ports is private to iceoryx2. It is the first field of `DynamicConfig`, which is
-//! `repr(C)` because processes share it, and the workspace names the exact version.
+//! `repr(C)` because processes share it. The workspace fixes the exact version of iceoryx2.
 
 use core::cell::{Cell, RefCell};
 use core::ptr::NonNull;
@@ -31,7 +31,7 @@ type List<T> = <Bags as BagFamily>::Bag<T>;
 /// Whether a service has ports of one kind; lives no longer than the service.
 pub(super) struct Anyone<T: BagType> {
     list: NonNull<List<T>>,
-    /// The list when it was last looked at.
+    /// The state of the list when it was last read.
     seen: RefCell<<Bags as BagFamily>::BagState<T>>,
     is_there: Cell<bool>,
 }
@@ -72,21 +72,21 @@ impl Listeners {
 
 impl<T: BagType> Anyone<T> {
     fn on(list: NonNull<List<T>>) -> Self {
-        // SAFETY: see the head of this file; the service, which the caller has, is initialised.
+        // SAFETY: see the head of this file. The caller has the service open, so it is initialised.
         let list_now = unsafe { list.as_ref() };
         Self {
             list,
             // SAFETY: as above.
             seen: RefCell::new(unsafe { list_now.get_state() }),
-            // Counted after the number was read: who comes in between changes it again.
+            // Counted after the number was read: a port that comes in between changes it again.
             is_there: Cell::new(!list_now.is_empty()),
         }
     }
 
-    /// Whether somebody is there. One that was killed counts until it is swept.
+    /// Whether there is a port. A killed process's port counts until a sweep removes it.
     #[inline(always)]
     pub(super) fn is_there(&self) -> bool {
-        // SAFETY: the service that has the list lives, and the state is of this list.
+        // SAFETY: the service that owns the list is open, and the state belongs to this list.
         let (list, changed) = unsafe {
             let list = self.list.as_ref();
             (list, list.update_state(&mut self.seen.borrow_mut()))

@@ -1,4 +1,4 @@
-//! Both sides of a request.
+//! Both sides of a request without its types: `Asker` sends the bytes, `Answerer` replies.
 
 use core::ptr::NonNull;
 use core::time::Duration;
@@ -16,7 +16,6 @@ use iceoryx2::service::static_config::message_type_details::TypeDetail;
 
 use super::behind;
 use crate::bus::Bus;
-use crate::doorbell::RoleRinger;
 use crate::error::{CallError, PortError, ReceiveError};
 use crate::fault::TransportFault;
 use crate::here::{Here, ends_here};
@@ -24,6 +23,7 @@ use crate::kind::{Bytes, Header, Question};
 use crate::patience::{Fault, patiently};
 use crate::service::{self, MAX_CLIENTS, MAX_SERVERS, RequestService};
 use crate::transport::Ipc;
+use lager_wake::PartRinger;
 
 /// How often an asker looks for its answer. Askers are not actors, so no ring wakes them.
 const LOOK_EVERY: Duration = Duration::from_micros(200);
@@ -32,7 +32,7 @@ const LOOK_EVERY: Duration = Duration::from_micros(200);
 pub(crate) struct Asker {
     port: Here<AskingPort>,
     question: Question,
-    ringer: RoleRinger,
+    ringer: PartRinger,
 }
 
 struct AskingPort {
@@ -49,7 +49,8 @@ ends_here!(AskingPort, AnsweringPort, Active);
 impl Asker {
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, question: Question) -> Result<Self, PortError> {
-        let ringer = RoleRinger::to(bus.board(), question.actor, question.id)?;
+        let ringer = PartRinger::to(bus.board(), question.actor, question.id)
+            .map_err(|fault| PortError::of_bell(question.actor, fault))?;
         let service = service::request(bus, &question)?;
         let client = patiently(bus, question.name, || {
             service
@@ -74,8 +75,8 @@ impl Asker {
         })
     }
 
-    /// Puts the bytes of a request and waits for those of the reply, at most `timeout` of real time
-    /// from `start` on.
+    /// Sends the bytes of a request and waits for those of the reply, at most until `start` +
+    /// `timeout`, in real time.
     #[inline(never)]
     pub(crate) fn call(
         &self,
@@ -89,7 +90,7 @@ impl Asker {
         loop {
             let present = self.servers();
             if present.iter().any(|server| !asked.contains(server)) {
-                // The earlier question is withdrawn before it is put again.
+                // The earlier request is withdrawn before it is sent again.
                 drop(pending.take());
                 let question = self.ask(request)?;
                 if question.number_of_server_connections() > 0 {
@@ -98,7 +99,7 @@ impl Asker {
                 }
             }
             if let Some(question) = &pending {
-                // SAFETY: the reply is read as bytes, of which it has as many as its service says.
+                // SAFETY: the reply is read as bytes, and it has as many as the service states.
                 match unsafe { question.receive_custom_payload() } {
                     Ok(Some(answer)) => {
                         let details = self.port.service.static_config();
@@ -123,7 +124,7 @@ impl Asker {
     }
 
     fn ask(&self, request: &[u8]) -> Result<Pending, CallError> {
-        // SAFETY: a payload of a fixed size is one element, and the transport counts it.
+        // SAFETY: a payload of a fixed size is one element, and that is how the transport counts.
         let loan = unsafe { self.port.client.loan_custom_payload(1) };
         let mut loan = loan.map_err(|error| self.failed(error))?;
         let details = self.port.service.static_config();
@@ -216,10 +217,10 @@ impl Asked<'_> {
         copy_out(self.active.user_header(), &self.answerer.request, request);
     }
 
-    /// Answers it. An asker that is gone by now needs no answer.
+    /// Sends the reply. If the asker is gone by now, it needs none.
     #[inline(never)]
     pub(crate) fn answer(self, reply: &[u8]) {
-        // SAFETY: a payload of a fixed size is one element, and the transport counts it.
+        // SAFETY: a payload of a fixed size is one element, and that is how the transport counts.
         let Ok(mut loan) = (unsafe { self.active.loan_custom_payload(1) }) else {
             return;
         };
@@ -233,7 +234,7 @@ impl Asked<'_> {
 fn copy_out(header: &Header, payload: &TypeDetail, to: &mut [u8]) {
     assert_eq!(to.len(), payload.size());
     let from = behind(NonNull::from(header), 0, payload.alignment());
-    // SAFETY: there are as many bytes as the service says, any of which are a value.
+    // SAFETY: the payload has as many bytes as the service states, and any bytes are a valid value.
     unsafe { from.copy_to_nonoverlapping(NonNull::from(to).cast(), payload.size()) }
 }
 
@@ -241,6 +242,6 @@ fn copy_out(header: &Header, payload: &TypeDetail, to: &mut [u8]) {
 fn copy_in(header: &mut Header, payload: &TypeDetail, from: &[u8]) {
     assert_eq!(from.len(), payload.size());
     let to = behind(NonNull::from(header), 0, payload.alignment());
-    // SAFETY: there is room for as many bytes as the service says, and the loan is the caller's.
+    // SAFETY: the loan has room for as many bytes as the service states, and is the caller's alone.
     unsafe { to.copy_from_nonoverlapping(NonNull::from(from).cast(), payload.size()) }
 }

@@ -1,27 +1,25 @@
-//! The public end of a topic whose actors are served first.
+//! [`Copies`]: sends a topic's samples to observers, after the actors have been served and rung.
 //!
-//! The writer takes the bytes of a sample here before it hands the sample to the actors, and puts
-//! the copy on the public service after it has rung them. To loan the copy's sample before the ring
-//! would not do, because a loan takes back what every observer has returned.
+//! The writer first copies the bytes of a sample into memory of its own, then hands the sample to
+//! the actors. When it has rung them, it loans a sample of the public service and sends the copy
+//! there. It does not loan that sample earlier, because for each loan iceoryx2 first takes back the
+//! samples that every observer has returned, and the actors would wait for that.
 //!
-//! A copy can wait until its thread has done what is more urgent ([`crate::Loan::send_ahead`]).
-//! Only the bridge's readers let it wait, until the other frames of the same read are out.
-//! Everywhere else a copy goes out at once, for two reasons. On a frame's way nothing follows that
-//! it would hold up: after the order logic's turn is over, and the bridge writes its packet before
-//! it publishes, or publishes first what must be kept first. And observers rely on the order of
-//! what a service does: a request is answered when `link/health` shows its effect, an event is out
-//! before the status that follows from it, and a keeper has a state before it is acted upon.
+//! A writer can keep a copy back while its thread does something more urgent
+//! ([`crate::Loan::send_ahead`]). Every other way of sending sends the copy at once, because
+//! observers rely on the order in which a process does things: they see an event before the status
+//! that follows from it, and a keeper gets a state before its writer acts on it.
 //!
 //! **Invariant:** readers of the public service count losses as exactly as the actors do. A copy
-//! has the sample's stamp, copies go out in the order of the samples, and one is left out only when
-//! nobody could miss it: no reader is there, and none that comes later is owed the last sample. A
-//! reader that comes between the look and the sample has come after its publish time, so it is not
-//! owed a stream's sample.
+//! has the sample's stamp, and copies go out in the order of the samples. The writer leaves out a
+//! copy only when nobody could miss it: there is no reader, and the topic is not a state, whose
+//! last sample later readers must get. A reader that comes between this check and the sample has
+//! come after the sample's publish time, so a stream does not owe it that sample.
 
 use core::cell::Cell;
 use core::ptr::NonNull;
 
-use lager_topics::Stamp;
+use lager_sample::Stamp;
 
 use super::anyone::Readers;
 use super::outlet::Outlet;
@@ -32,16 +30,16 @@ use crate::kind::{Kind, Side};
 
 ends_here!(Readers);
 
-/// Where everybody but the actors reads.
+/// The public service, where everybody but the actors reads.
 pub(crate) struct Copies {
     outlet: Outlet,
-    /// Who reads there.
+    /// The readers of that service.
     readers: Here<Readers>,
-    /// Readers that come later are owed the last sample.
+    /// The topic is a state: readers that come later must get the last sample.
     is_state: bool,
-    /// At the last sample there was a reader.
+    /// There was a reader when the last sample was sent.
     watched: Cell<bool>,
-    /// The sample taken last, and whether it is still to be published.
+    /// The stamp of the sample taken last; `owed` says whether that must still be published.
     stamp: Cell<Stamp>,
     payload: Box<[Cell<u8>]>,
     owed: Cell<bool>,
@@ -62,8 +60,8 @@ impl Copies {
         })
     }
 
-    /// Takes a sample whose payload is at `payload`, if somebody could miss it. The one taken
-    /// before has been published.
+    /// Copies a sample whose payload is at `payload`, if anybody could miss it. The caller has
+    /// published the sample taken before.
     #[inline]
     pub(crate) fn take(&self, stamp: &Stamp, payload: NonNull<u8>) {
         if !self.are_due() {
@@ -71,24 +69,24 @@ impl Copies {
         }
         self.stamp.set(*stamp);
         let to = NonNull::from(&*self.payload).cast::<u8>();
-        // SAFETY: `payload` is the caller's and of the service's size, as is what lies at `to`,
-        // which is in cells, so it may be written behind a shared reference.
+        // SAFETY: `payload` comes from the caller and is as large as the service's payload; so is
+        // `to`, whose bytes are in cells, so that they may be written behind a shared reference.
         unsafe { to.copy_from_nonoverlapping(payload, self.payload.len()) };
         self.owed.set(true);
     }
 
-    /// Whether a copy of the next sample has to be made.
+    /// Whether the next sample needs a copy.
     #[inline]
     fn are_due(&self) -> bool {
         let watched = self.readers.is_there();
         if self.watched.replace(watched) && !watched {
-            // Lets go of what the last reader had.
+            // Frees what the last reader had.
             self.tick();
         }
         watched || self.is_state
     }
 
-    /// Publishes the copy of the sample taken last, if that is still to be done.
+    /// Publishes the copy of the sample taken last, unless that was already done.
     #[inline]
     pub(crate) fn publish(&self) -> Result<(), SendError> {
         if !self.owed.replace(false) {
@@ -96,7 +94,7 @@ impl Copies {
         }
         let lent = self.outlet.lend()?;
         let from = NonNull::from(&*self.payload).cast::<u8>();
-        // SAFETY: the loan is ours and has room for a payload of the service's size.
+        // SAFETY: nobody else has the loan, and it has room for a payload of the service's size.
         unsafe {
             lent.payload()
                 .copy_from_nonoverlapping(from, self.payload.len());
@@ -104,7 +102,7 @@ impl Copies {
         lent.send(self.stamp.get())
     }
 
-    /// Connects to readers that have come, and gives them their history.
+    /// Connects to new readers and sends them their history.
     pub(crate) fn tick(&self) {
         self.outlet.tick();
     }

@@ -1,9 +1,10 @@
-//! The transport's ports without their payload's type, compiled here and nowhere else.
+//! The transport's ports without the payload's type, so that only this crate compiles them.
 //!
 //! iceoryx2 is generic over its service type, and every crate that uses generic code compiles it
-//! again: some six thousand functions, for a port of any type. So a typed port holds one of these,
-//! which knows its payload by size and alignment only, as iceoryx2's bindings for other languages
-//! do. What it hands on contains nothing of the transport, not even its drop code (`here`).
+//! again: about six thousand functions for a port of any type. So a typed port holds one of the
+//! ports of this module, which knows the size and alignment of its payload only, like iceoryx2's
+//! bindings for other languages. What such a port returns contains nothing of the transport, not
+//! even drop code (`here`).
 //!
 //! To other processes the services look typed: name, size and alignment of payload and header are
 //! the same, and a typed port of plain iceoryx2 may be at the other end (tests/bus/interop.rs).
@@ -11,8 +12,8 @@
 //! **Invariant:** a payload's address is only ever read or written as the type whose `Kind` or
 //! `Question` the port was made with.
 //!
-//! What it costs and saves: a publish takes 140 instructions more than the 4 833 it took with
-//! generic ports. A cold build of everything took 5 min 19 s before; with this, without line tables
+//! Costs and savings: a publish takes 140 instructions more than the 4 833 that it took with
+//! generic ports. A cold build of everything took 5 min 19 s before. With this, without line tables
 //! and without the regular expressions of a log filter it takes 3 min 7 s (one machine, within one
 //! hour).
 
@@ -44,13 +45,13 @@ pub(crate) use writer::{To, Writer};
 
 ends_here!(TopicService);
 
-/// Where a payload is: behind its header of `size` bytes, at the next multiple of `align`.
+/// The address of a payload: behind its header of `size` bytes, at the next multiple of `align`.
 ///
-/// The transport would return it as a slice, but its length stands in shared memory, where others
-/// can write anything. So only the address is taken from it.
+/// The transport would return the payload as a slice, but the slice's length stands in shared
+/// memory, where another process may write anything. So only the address comes from the transport.
 fn behind(header: NonNull<Header>, size: usize, align: usize) -> NonNull<u8> {
     let header = header.cast::<u8>();
-    // SAFETY: header and payload are of one chunk, whose layout this is
+    // SAFETY: header and payload lie in one chunk, and its layout is the one computed here
     // (`MessageTypeDetails::payload_ptr_from_header`).
     unsafe {
         let end = header.add(size);

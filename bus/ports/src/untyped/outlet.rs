@@ -1,4 +1,4 @@
-//! A writer's port on one of a topic's services, and what is on loan from it.
+//! [`Outlet`]: a writer's port on one of a topic's services. [`Lent`]: a sample on loan from it.
 
 use core::cell::RefCell;
 use core::ptr::NonNull;
@@ -9,7 +9,7 @@ use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{BackpressureStrategy, PortFactory};
 use iceoryx2::sample_mut::SampleMut;
-use lager_topics::Stamp;
+use lager_sample::Stamp;
 
 use super::anyone::Readers;
 use super::behind;
@@ -38,7 +38,7 @@ thread_local! {
     static STATES: RefCell<Vec<Weak<Here<Port>>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Gives readers that have come since to the states of this thread their history.
+/// Sends history to readers that have come to a state that this thread writes.
 pub(crate) fn republish_states() {
     // A thread that is ending has no states any more.
     let _ = STATES.try_with(|states| {
@@ -49,14 +49,14 @@ pub(crate) fn republish_states() {
     });
 }
 
-/// A sample on loan; dropped unsent it leaves no trace.
+/// A sample on loan. If it is dropped unsent, nobody notices.
 pub(crate) struct Lent {
     sample: Here<Loaned>,
     payload: NonNull<u8>,
 }
 
 impl Outlet {
-    /// On a service of a topic of this process.
+    /// Makes a port on a service of a topic in the table.
     pub(crate) fn new(bus: &Bus, kind: &Kind, side: Side) -> Result<Self, PortError> {
         let outlet = Self::on(bus, kind.name, service::topic(bus, kind, side)?)?;
         if kind.qos.republish {
@@ -68,7 +68,7 @@ impl Outlet {
         Ok(outlet)
     }
 
-    /// On a service of the topic called `name`.
+    /// Makes a port on `service`, which belongs to the topic called `name`.
     pub(crate) fn on(bus: &Bus, name: &str, service: TopicService) -> Result<Self, PortError> {
         let limits = service.static_config();
         let port = patiently(bus, name, || {
@@ -76,7 +76,7 @@ impl Outlet {
                 .publisher_builder()
                 .name(bus.port_name())
                 .max_loaned_samples(MAX_LOANS)
-                // With overflow there is always room; whatever else happens, never wait.
+                // With overflow there is always room. Whatever else happens, never wait.
                 .backpressure_strategy(BackpressureStrategy::DiscardData)
                 .create()
                 .map_err(|error| match error {
@@ -99,10 +99,9 @@ impl Outlet {
     /// Takes a sample. Its payload is whatever was there before.
     #[inline(always)]
     pub(crate) fn lend(&self) -> Result<Lent, SendError> {
-        // SAFETY: a payload of a fixed size is one element, and the transport counts it.
+        // SAFETY: a payload of a fixed size is one element, and that is how the transport counts.
         let sample = unsafe { self.port.loan_custom_payload(1) }.map_err(refused)?;
-        // SAFETY: memory that others have written is initialised, and bytes are all that it is
-        // taken for here.
+        // SAFETY: memory that others have written is initialised, and it is read as bytes only.
         let mut sample = unsafe { sample.assume_init() };
         let header = NonNull::from(sample.user_header_mut());
         Ok(Lent {
@@ -111,7 +110,7 @@ impl Outlet {
         })
     }
 
-    /// Who reads the service; not to be asked when this is gone.
+    /// The readers of the service. Do not ask the result when this outlet is gone.
     pub(super) fn readers(&self) -> Readers {
         Readers::of(&self.service)
     }
@@ -122,36 +121,44 @@ impl Outlet {
         details.payload.size()
     }
 
-    /// Connects to readers that have come, and gives them their history; lets go of those that have
+    /// Connects to new readers, sends them their history, and disconnects from readers that have
     /// left.
     pub(crate) fn tick(&self) {
-        // A reader that cannot be connected now is tried again with the next change.
+        // A reader that cannot be connected now is tried again at the next change.
         let _ = self.port.update_connections();
     }
 }
 
 impl Lent {
-    /// Where the payload is, aligned and large enough for one; valid as long as this is.
+    /// The payload's address, aligned and large enough for one; valid while this loan is.
     pub(crate) fn payload(&self) -> NonNull<u8> {
         self.payload
+    }
+
+    /// Writes all bytes of the payload.
+    pub(crate) fn fill(&self, payload: &[u8]) {
+        let from = NonNull::from(payload).cast();
+        // SAFETY: the caller passes as many bytes as a payload has. Nobody else has the loan, and
+        // `payload` is memory of this process.
+        unsafe { self.payload.copy_from_nonoverlapping(from, payload.len()) };
     }
 
     /// Sends it with that stamp.
     #[inline(always)]
     pub(crate) fn send(mut self, stamp: Stamp) -> Result<(), SendError> {
         let header = NonNull::from(self.sample.user_header_mut()).cast::<Stamp>();
-        // SAFETY: the service's header is a `Stamp` (`Kind::header`), and the loan is ours.
+        // SAFETY: the service's header is a `Stamp` (`Kind::header`), and nobody else has the loan.
         unsafe { header.write(stamp) };
         sent(self.sample.take())
     }
 }
 
-/// The only place that sends, so that the compiler puts iceoryx2's loop over the places of
-/// subscribers in here. Called from several places, that loop stayed a function of its own and kept
-/// its counter in memory: 21 instructions for each place that is not taken instead of 14. For the
-/// 74 places of a topic without actors, a publish took 4 760 instructions instead of 4 290, and 1.2
-/// to 1.3 times as long as bare iceoryx2 instead of 1.05 to 1.1 (one process, 64 bytes, one
-/// reader). `publish/to-1` in `benches/limits.toml` shows if a compiler does it otherwise.
+/// The only place that sends, so that the compiler inlines iceoryx2's loop over the places of
+/// subscribers here. When several places sent, the loop stayed a function and kept its counter in
+/// memory: 21 instead of 14 instructions for each place that is not taken. For the 74 places of a
+/// topic without actors, a publish took 4 760 instead of 4 290 instructions, and 1.2 to 1.3 times
+/// as long as bare iceoryx2 instead of 1.05 to 1.1 (one process, 64 bytes, one reader).
+/// `publish/to-1` in `benches/limits.toml` shows if a compiler does it otherwise.
 #[inline(never)]
 fn sent(sample: Loaned) -> Result<(), SendError> {
     match sample.send() {

@@ -1,4 +1,4 @@
-//! The reading end of a topic.
+//! [`Reader`]: receives a topic's samples without the payload's type.
 
 use core::ptr::NonNull;
 use std::sync::Arc;
@@ -8,11 +8,11 @@ use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::port::{DegradationAction, ReceiveError as IpcReceiveError};
 use iceoryx2::prelude::{CallbackProgression, PortFactory};
 use iceoryx2::sample::Sample;
-use lager_topics::{OBSERVERS, Stamp};
+use lager_home::Clock;
+use lager_sample::Stamp;
 
 use super::behind;
 use crate::bus::Bus;
-use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError};
 use crate::here::{Here, ends_here};
 use crate::kind::{Bytes, Header, Kind, Side};
@@ -29,9 +29,9 @@ pub(crate) struct Reader {
     holds: bool,
     streams: Streams,
     newest: Newest,
-    /// Writers that could not be connected to.
+    /// How many writers this reader could not connect to.
     unreached: Arc<AtomicU32>,
-    /// The public service, which an actor does not read, but keeps for those who look for the
+    /// The public service. An actor does not read it, but keeps it open so that tools find the
     /// topic.
     _public: Option<Here<TopicService>>,
 }
@@ -41,7 +41,7 @@ type Received = Sample<Ipc, Bytes, Header>;
 
 ends_here!(Port, Received);
 
-/// A received sample, which the reader holds until this is dropped.
+/// A received sample. The reader holds it until this is dropped.
 pub(crate) struct Taken {
     _sample: Here<Received>,
     payload: NonNull<u8>,
@@ -52,20 +52,50 @@ impl Reader {
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, kind: &Kind) -> Result<Self, PortError> {
         let public = service::topic(bus, kind, Side::Public)?;
-        match kind.side(bus.role()) {
-            Side::Public => Self::of(bus, kind.name, &public),
+        match kind.side(bus.part()) {
+            Side::Public => Self::of(bus, kind.name, &public, kind.qos.observers),
             Side::Actors => Ok(Self {
                 _public: Some(Here::new(public)),
-                ..Self::of(bus, kind.name, &service::topic(bus, kind, Side::Actors)?)?
+                ..Self::of(
+                    bus,
+                    kind.name,
+                    &service::topic(bus, kind, Side::Actors)?,
+                    kind.qos.observers,
+                )?
             }),
         }
     }
 
-    /// A reader of the topic called `name`, of which this is a service.
+    /// A reader of a topic that another process has described. The description does not say how
+    /// many observers the topic admits, so observers leave an eighth of the places free for actors.
+    pub(crate) fn of_found(
+        bus: &Bus,
+        name: &str,
+        service: &TopicService,
+    ) -> Result<Self, PortError> {
+        let places = service.static_config().max_subscribers();
+        Self::of(bus, name, service, places - places / 8)
+    }
+
+    /// A reader of `service`, which belongs to the topic called `name`.
     #[inline(never)]
-    pub(crate) fn of(bus: &Bus, name: &str, service: &TopicService) -> Result<Self, PortError> {
+    fn of(
+        bus: &Bus,
+        name: &str,
+        service: &TopicService,
+        observers: usize,
+    ) -> Result<Self, PortError> {
         let limits = service.static_config();
-        let no_place = || Fault::Full(no_place(bus, name, limits.max_subscribers()));
+        let no_place = || {
+            let topic = name.to_owned();
+            Fault::Full(if bus.part().is_observer() {
+                let limit = observers;
+                PortError::TooManyObservers { topic, limit }
+            } else {
+                let limit = limits.max_subscribers();
+                PortError::TooManyReaders { topic, limit }
+            })
+        };
         let unreached = Arc::new(AtomicU32::new(0));
         let port = patiently(bus, name, || {
             unreached.store(0, Ordering::Relaxed);
@@ -73,7 +103,7 @@ impl Reader {
             let subscriber = service
                 .subscriber_builder()
                 .name(bus.port_name())
-                // The others are received all the same.
+                // The samples of other writers are received all the same.
                 .set_degradation_handler(move |_, _| {
                     missed.fetch_add(1, Ordering::Relaxed);
                     DegradationAction::Ignore
@@ -84,9 +114,9 @@ impl Reader {
                     SubscriberCreateError::ExceedsMaxSupportedSubscribers => no_place(),
                     other => service::no_resources(name, other),
                 })?;
-            // This counts with the new reader in place, so that two readers that come at once
+            // Counts when the new reader has its place, so that two readers that come at once
             // cannot both get the last place.
-            if bus.role().is_observer() && observers(service) > OBSERVERS {
+            if bus.part().is_observer() && observing(service) > observers {
                 return Err(no_place());
             }
             Ok(subscriber)
@@ -95,7 +125,7 @@ impl Reader {
             port: Here::new(port),
             payload_align: limits.message_type_details().payload.alignment(),
             holds: limits.history_size() > 0,
-            // Taken after the port exists: a publisher that is younger has seen the port from its
+            // Taken after the port exists: a publisher that is younger has seen the port since its
             // start.
             streams: Streams::new(Clock::monotonic_ns()),
             newest: Newest::default(),
@@ -104,12 +134,12 @@ impl Reader {
         })
     }
 
-    /// Whether the topic holds its last sample for those who come later.
+    /// Whether the topic keeps its last sample for readers that come later.
     pub(crate) fn holds(&self) -> bool {
         self.holds
     }
 
-    /// How many samples can wait for this end.
+    /// How many samples can wait for this reader.
     pub(crate) fn queue(&self) -> usize {
         self.port.buffer_size()
     }
@@ -136,7 +166,7 @@ impl Reader {
         }
     }
 
-    /// The newest sample of all that there are, if it is newer than what this has returned before.
+    /// The newest of all waiting samples, if it is newer than any that this has returned before.
     #[inline(never)]
     pub(crate) fn latest(&mut self) -> Result<Option<Taken>, ReceiveError> {
         let mut latest = None;
@@ -165,39 +195,27 @@ impl Reader {
 }
 
 impl Taken {
-    /// The payload's address, valid as long as this is. No process writes to it meanwhile.
+    /// The payload's address, valid while this is. No process writes to it meanwhile.
     pub(crate) fn payload(&self) -> NonNull<u8> {
         self.payload
     }
 
     pub(crate) fn stamp(&self) -> &Stamp {
-        // SAFETY: the service's header is a `Stamp` (`Kind::header`); the sample is held, and its
-        // writer does not touch it before it is given back.
+        // SAFETY: the service's header is a `Stamp` (`Kind::header`). The reader holds the sample,
+        // and its writer does not change it before it is given back.
         unsafe { self.stamp.as_ref() }
     }
 }
 
-fn observers(service: &TopicService) -> usize {
+fn observing(service: &TopicService) -> usize {
     let mut observers = 0;
     service.dynamic_config().list_subscribers(|details| {
         if name::parse_port(details.subscriber_name.as_str())
-            .is_some_and(|(role, _)| role.is_observer())
+            .is_some_and(|(_, _, observes)| observes)
         {
             observers += 1;
         }
         CallbackProgression::Continue
     });
     observers
-}
-
-fn no_place(bus: &Bus, name: &str, limit: usize) -> PortError {
-    let topic = name.to_owned();
-    if bus.role().is_observer() {
-        PortError::TooManyObservers {
-            topic,
-            limit: OBSERVERS,
-        }
-    } else {
-        PortError::TooManyReaders { topic, limit }
-    }
 }

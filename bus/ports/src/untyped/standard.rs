@@ -1,8 +1,8 @@
-//! Listeners of plain iceoryx2, for programs that know nothing of bell boards.
+//! Notifies listeners of plain iceoryx2, which know nothing of this project's bell boards.
 //!
-//! Beside each topic stands an event service of the same name. A stock process that listens there
-//! is notified of every sample, which costs the writer one system call for each listener. While
-//! there is no listener, a writer only reads a number in shared memory (`anyone`).
+//! Beside each topic stands an event service of the same name. The writer notifies a program that
+//! listens there of every sample, at the cost of one system call for each listener. While there is
+//! no listener, the writer only reads a number in shared memory (`anyone`).
 
 use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
 
@@ -14,7 +14,7 @@ use crate::patience::{Fault, patiently};
 use crate::service::{self, EventService};
 use crate::transport::Ipc;
 
-/// The standard listeners of one topic, from a writer's side.
+/// The listeners of one topic, as a writer sees them.
 pub(crate) struct StandardListeners {
     listeners: Listeners,
     _service: EventService,
@@ -46,11 +46,11 @@ impl StandardListeners {
         })
     }
 
-    /// Notifies them, if there are any.
+    /// Notifies all listeners, if there are any.
     #[inline]
     pub(crate) fn notify(&self) {
         if self.listeners.is_there() {
-            // A listener that has died or is full needs no notice.
+            // A listener that has died or whose queue is full needs no notice.
             let _ = self.notifier.notify();
         }
     }

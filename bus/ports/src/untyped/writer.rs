@@ -1,31 +1,31 @@
-//! The writing end of a topic: actors first, everybody else after they were rung.
+//! [`Writer`]: sends samples to a topic's actors, rings them, and then sends to everybody else.
 
 use core::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use lager_topics::Stamp;
+use lager_home::Clock;
+use lager_sample::Stamp;
+use lager_wake::PartRinger;
 
 use super::copies::Copies;
 use super::outlet::{Lent, Outlet};
 use super::standard::StandardListeners;
 use crate::bus::Bus;
 use crate::cause::Cause;
-use crate::clock::Clock;
-use crate::doorbell::RoleRinger;
 use crate::error::{PortError, SendError};
 use crate::here::{Here, ends_here};
 use crate::kind::{Kind, Side};
 
 /// [`crate::Publisher`] without the payload's type.
 pub(crate) struct Writer {
-    /// Where the actors read: their own service, or the topic's only one.
+    /// The service that the actors read: their own, or the topic's only one.
     outlet: Outlet,
-    /// Where everybody else does, if the actors have their own.
+    /// The service that everybody else reads, if the actors have their own.
     copies: Option<Copies>,
-    /// Everybody else has not got the last sample yet.
+    /// Everybody but the actors must still get the last sample.
     behind: Cell<bool>,
     standard: Here<StandardListeners>,
-    ringers: Box<[RoleRinger]>,
+    ringers: Box<[PartRinger]>,
     next_sequence: Cell<u64>,
     epoch: u64,
     writer: u32,
@@ -36,12 +36,11 @@ ends_here!(StandardListeners);
 /// Who gets a sample at once.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum To {
-    /// First the actors, who are rung, then everybody else.
+    /// The actors, who are rung, then everybody else.
     All,
-    /// The same, but the actors are not rung: they look when they are next awake.
+    /// The same without a ring: the actors look when they next wake.
     AllQuietly,
-    /// The actors, who are rung. Everybody else gets it when the writer is asked to catch up, sends
-    /// again or ends.
+    /// The actors, who are rung. Everybody else gets it when the writer catches up, sends or ends.
     Actors,
 }
 
@@ -52,7 +51,10 @@ impl Writer {
             .qos
             .actors
             .iter()
-            .map(|actor| RoleRinger::to(bus.board(), *actor, kind.id))
+            .map(|actor| {
+                PartRinger::to(bus.board(), *actor, kind.id)
+                    .map_err(|fault| PortError::of_bell(*actor, fault))
+            })
             .collect::<Result<_, _>>()?;
         let standard = StandardListeners::of(bus, kind)?;
         let (copies, side) = if kind.qos.serves_actors_first() {
@@ -68,7 +70,7 @@ impl Writer {
             ringers,
             next_sequence: Cell::new(0),
             // Taken after the ports exist: a subscriber that is older than the epoch was there for
-            // every sample, and may count its losses from 0 on.
+            // every sample, so it may count losses from number 0 on.
             epoch: new_epoch(),
             writer: std::process::id(),
         })
@@ -80,7 +82,7 @@ impl Writer {
         self.outlet.lend()
     }
 
-    /// Sends a sample that follows from `cause`, as published at that time.
+    /// Sends a sample that follows from `cause`, published at that time.
     #[inline(never)]
     pub(crate) fn deliver(
         &self,
@@ -133,7 +135,7 @@ impl Writer {
         sent.and(before).and(after)
     }
 
-    /// Hands the last sample to everybody but the actors, if that is still to be done.
+    /// Sends the last sample to everybody but the actors, unless that was already done.
     #[inline]
     pub(crate) fn catch_up(&self) -> Result<(), SendError> {
         if !self.behind.replace(false) {
@@ -144,7 +146,7 @@ impl Writer {
         copied
     }
 
-    /// Connects to readers that have come, and gives them their history.
+    /// Connects to new readers and sends them their history.
     #[inline(never)]
     pub(crate) fn tick(&self) {
         self.outlet.tick();
@@ -153,7 +155,7 @@ impl Writer {
         }
     }
 
-    /// Start of this writer's life.
+    /// When this writer was made.
     pub(crate) fn epoch(&self) -> u64 {
         self.epoch
     }
@@ -166,12 +168,12 @@ impl Writer {
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        // Who reads the public service counts a copy that failed as lost.
+        // If this fails, readers of the public service count the sample as lost.
         let _ = self.catch_up();
     }
 }
 
-/// The current time, made unique within the process.
+/// The current time, changed if need be so that no two writers of this process have the same.
 pub(super) fn new_epoch() -> u64 {
     static LAST: AtomicU64 = AtomicU64::new(0);
     let now = Clock::monotonic_ns();

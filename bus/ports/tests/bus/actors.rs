@@ -1,14 +1,14 @@
-//! Actors have a service of their own and are served first; everybody else gets the same samples,
-//! as exactly.
+//! Actors have a service of their own and are served first. Everybody else gets the same samples,
+//! and counts losses as exactly.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
-use lager_ports::{Cause, Peer, Policy, PortError, Wake};
+use lager_ports::{Cause, Peer, PortError};
 use lager_rig::Process;
-use lager_topics::{
-    Health, LARGEST_COPY, LinkHealth, OBSERVERS, Qos, Role, SensorLine, Stamp, Topic, payload,
-};
+use lager_sample::{LARGEST_COPY, Qos, Stamp, Topic, payload};
+use lager_topics::{Health, LinkHealth, Role, SensorLine};
+use lager_wake::{Policy, Wake};
 
 use crate::domain::{Domain, drain, frame, send, sweep};
 use crate::interop::stock_listener_of_line;
@@ -16,7 +16,7 @@ use crate::process;
 
 const NOTHING: [u32; 0] = [];
 
-/// The services of publish-subscribe on a bus, by what their descriptions say.
+/// The publish-subscribe services of a bus, counted by their descriptions.
 fn services(domain: &Domain) -> usize {
     let files = domain.left_in_folder();
     let is_one = |path: &std::path::PathBuf| {
@@ -59,7 +59,7 @@ fn actors_and_observers_get_the_same_samples_with_the_same_stamps() {
 #[ignore = "needs two cores; `tests/run` runs it where there are two"]
 fn an_actor_that_looks_without_pause_is_there_before_the_observers_have_the_sample() {
     const ROUNDS: u32 = 10_000;
-    // On one core nobody would be there while the writer runs.
+    // On one core the observer could not run while the writer runs.
     let domain = Domain::new();
     let publisher = domain.open(Role::Bridge).publisher::<SensorLine>().unwrap();
     let looked_at = AtomicU32::new(0);
@@ -75,7 +75,7 @@ fn an_actor_that_looks_without_pause_is_there_before_the_observers_have_the_samp
             for number in 1..=ROUNDS {
                 assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
                 if drain(last).is_empty() {
-                    // With the copies first, the ring that was heard would say that it is there.
+                    // If the copy came first, the observer would have it when the ring is heard.
                     was_first.store(true, Ordering::Release);
                     break;
                 }
@@ -126,7 +126,7 @@ fn observers_get_what_was_sent_ahead_when_its_writer_catches_up() {
     assert_eq!(drain(&mut observer), NOTHING, "it has caught up");
     assert_eq!(listener.try_wait(|_| ()).unwrap(), 0);
 
-    // In the order in which they were sent, whatever comes next.
+    // In the order in which they were sent, whichever way of sending comes next.
     ahead(1);
     ahead(2);
     assert_eq!(drain(&mut observer), [1]);
@@ -151,7 +151,7 @@ fn a_killed_writer_takes_no_more_along_than_what_it_had_sent_ahead() {
     process::start(&domain, "line-writer-ahead").kill();
     assert_eq!(drain(&mut actor), (0..10).collect::<Vec<_>>());
     assert_eq!(drain(&mut observer), (0..9).collect::<Vec<_>>());
-    // Its successor is a new stream, and no loss.
+    // The successor's samples are a new stream and not a loss.
     process::start(&domain, "line-writer").kill();
     for reader in [&mut actor, &mut observer] {
         assert_eq!(drain(reader), (0..10).collect::<Vec<_>>());
@@ -191,7 +191,7 @@ fn observers_that_come_and_go_miss_nothing_of_what_is_theirs() {
     send(&publisher, 0);
     let unwatched = domain.in_shared_memory().len();
     for _ in 0..3 {
-        // Nobody watches, so no copies are made.
+        // There is no observer, so the writer makes no copies.
         (0..50).for_each(|number| send(&publisher, number));
         let observer = domain.open(Role::Observer);
         let mut observer = observer.subscriber::<SensorLine>().unwrap();
@@ -203,7 +203,7 @@ fn observers_that_come_and_go_miss_nothing_of_what_is_theirs() {
         assert_eq!(drain(&mut observer), (1..20).collect::<Vec<_>>());
         assert_eq!((observer.received(), observer.lost()), (20, 0));
         drop(observer);
-        // What connected them goes with the next sample.
+        // The next sample frees what connected the writer to the observer.
         send(&publisher, 0);
         assert_eq!(domain.in_shared_memory().len(), unwatched);
     }
@@ -226,7 +226,7 @@ fn a_state_reaches_late_joiners_of_both_kinds() {
     let domain = Domain::new();
     let bridge = domain.open(Role::Bridge);
     let publisher = bridge.publisher::<LinkHealth>().unwrap();
-    // Nobody is there yet.
+    // There is no reader yet.
     for bus_lost in 1..=3 {
         let health = Health {
             bus_lost,
@@ -251,7 +251,7 @@ fn a_state_reaches_late_joiners_of_both_kinds() {
             .all(|reader| reader.latest().unwrap().is_none())
     );
 
-    // Also while the writer only waits.
+    // It also works while the writer only waits.
     let waiter = bridge.waiter(Policy::Block).unwrap();
     let mut readers = late();
     assert_eq!(waiter.wait(Duration::from_millis(1)), Wake::TimedOut);
@@ -275,7 +275,7 @@ fn a_state_that_is_handed_over_reaches_the_successor_and_both_kinds_of_readers()
     keeper.hand_over().unwrap();
 
     let successor = domain.open(Role::Bridge);
-    // The keeper's tick is not needed: the value was sent after they came.
+    // The keeper need not tick, because the value was sent after the readers came.
     let roles = [Role::Logic, Role::Observer];
     let mut readers = roles.map(|role| domain.open(role).subscriber::<LinkHealth>().unwrap());
     let kept = std::thread::scope(|scope| {
@@ -340,11 +340,11 @@ fn neither_side_takes_places_of_the_other() {
     assert_eq!(refused, PortError::TooManyReaders { topic, limit });
 
     let observers = domain.open(Role::Observer);
-    let observers: Vec<_> = (0..OBSERVERS)
+    let observers: Vec<_> = (0..SensorLine::QOS.observers)
         .map(|_| observers.subscriber::<SensorLine>().unwrap())
         .collect();
     let services = domain.open(Role::Station);
-    let others = SensorLine::QOS.max_subscribers() - OBSERVERS;
+    let others = SensorLine::QOS.max_subscribers() - SensorLine::QOS.observers;
     let _others: Vec<_> = (0..others)
         .map(|_| services.subscriber::<SensorLine>().unwrap())
         .collect();
@@ -366,7 +366,7 @@ fn places_of_killed_actors_are_taken_again() {
     let players: Vec<_> = (0..SensorLine::QOS.max_acting())
         .map(|_| process::start(&domain, "line-actor"))
         .collect();
-    // All start before any is swept, since opening sweeps.
+    // All start before any is swept, because opening the bus sweeps.
     let bridge = domain.open(Role::Bridge);
     let logic = domain.open(Role::Logic);
     players.into_iter().for_each(Process::kill);
@@ -406,18 +406,19 @@ fn a_topic_is_one_whoever_reads_and_writes_it_where() {
     let _other = logic.publisher::<SensorLine>().unwrap();
     assert_eq!(line(), (3, 3, 1));
     let pid = std::process::id();
-    let peer = |role| Peer {
-        role: Some(role),
+    let peer = |role: Role| Peer {
+        part: Some(role.to_string()),
+        observes: false,
         pid,
     };
     let mut writers = onlooker.topics().unwrap()[0].writers.clone();
-    writers.sort_by_key(|writer| writer.role.map(Role::as_str));
+    writers.sort_by_key(|writer| writer.part.clone());
     let expected = [Role::Bridge, Role::Bridge, Role::Logic].map(peer);
     assert_eq!(writers, expected);
     drop((actor, publishers));
     assert_eq!(line(), (1, 2, 1));
 
-    // Nobody reads the actors' service as a topic of that name.
+    // A tool cannot read the actors' service as if it were a topic of that name.
     assert!(onlooker.found("sensor/line:actors").unwrap().is_none());
     assert!(onlooker.found(SensorLine::NAME).unwrap().is_some());
 }
@@ -425,7 +426,7 @@ fn a_topic_is_one_whoever_reads_and_writes_it_where() {
 payload! {
     /// A picture, too large to be copied.
     pub struct Picture: 65536 bytes {
-        /// What is on it.
+        /// The pixels.
         pub pixels: [[[u64; 32]; 16]; 16],
     }
 }
@@ -435,7 +436,7 @@ struct Camera;
 impl Topic for Camera {
     const NAME: &'static str = "camera/front";
     type Payload = Picture;
-    const QOS: Qos = Qos::stream(4).waking(&[Role::Logic]).uncopied();
+    const QOS: Qos = Qos::stream(4).waking(&[Role::Logic.part()]).uncopied();
     const SUMMARY: &'static str = "What is in front of the robot.";
 }
 
@@ -467,7 +468,7 @@ fn a_large_payload_is_not_copied() {
 }
 
 payload! {
-    /// Wind of somebody else's.
+    /// The wind, a payload of another program.
     pub struct Gust: 8 bytes {
         /// In mm/s.
         pub wind: u64,
@@ -479,7 +480,7 @@ struct Draught;
 impl Topic for Draught {
     const NAME: &'static str = "weather/draught";
     type Payload = Gust;
-    const QOS: Qos = Qos::stream(16).waking(&[Role::Guest]);
+    const QOS: Qos = Qos::stream(16).waking(&[Role::Guest.part()]);
     const SUMMARY: &'static str = "A topic that is in no table.";
 }
 
@@ -504,7 +505,7 @@ fn a_tool_that_does_not_know_a_topic_serves_its_actors_too() {
         drop(sample);
         assert_eq!(reader.lost(), 0);
     }
-    // Also one that was there before the tool.
+    // This also holds for an actor that was there before the tool.
     let tool = domain.open(Role::Recorder);
     let writer = tool.any_publisher(Draught::NAME).unwrap().unwrap();
     writer.send(&3_u64.to_ne_bytes()).unwrap();

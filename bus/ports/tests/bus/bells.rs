@@ -1,10 +1,11 @@
-//! `kill -9` of ringers and waiters at random moments, and what becomes of their seats.
+//! `kill -9` of ringers and waiters at random moments, and what happens to their seats.
 
 use std::time::{Duration, Instant};
 
-use lager_ports::{Policy, Wake, remove_stale_nodes};
+use lager_ports::remove_stale_nodes;
 use lager_rig::Process;
 use lager_topics::{Role, SensorLine};
+use lager_wake::{Policy, Wake};
 
 use crate::domain::{Domain, send, until};
 use crate::process;
@@ -12,10 +13,10 @@ use crate::waiting::spins_under_quick_rings;
 
 const LONG: Duration = Duration::from_secs(60);
 
-/// Rounds of killing; each starts some processes.
+/// Rounds of killing. Each round starts some processes.
 const ROUNDS: u64 = 8;
 
-/// A moment that differs from round to round and from run to run.
+/// Waits for a time that differs from round to round and from run to run.
 fn somewhere(round: u64) {
     let now = std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap();
     std::thread::sleep(Duration::from_micros(
@@ -44,7 +45,7 @@ fn a_ringer_killed_anywhere_leaves_a_bell_that_others_can_ring() {
         somewhere(round);
         flood.kill();
         logic.sweep();
-        // Until what the killed one had rung is used up.
+        // Until no ring of the killed process is left.
         while waiter.wait(Duration::from_millis(1)) == Wake::Rung {}
         std::thread::scope(|scope| {
             let sleeper = scope.spawn(|| {
@@ -77,7 +78,7 @@ fn waiters_killed_anywhere_give_their_seats_to_their_successors() {
         }
         somewhere(round);
         victims.into_iter().for_each(Process::kill);
-        // Nobody sweeps: every place of the role must be had all the same.
+        // Nobody sweeps, but a new waiter must still get every seat of the role.
         let successors: Vec<_> = (0..7)
             .map(|_| logic.waiter(Policy::Block).unwrap())
             .collect();
@@ -94,15 +95,15 @@ fn a_killed_spinner_gives_its_right_back() {
     let domain = Domain::new();
     let bridge = domain.open(Role::Bridge);
     let waiter = bridge.waiter(Policy::ADAPTIVE).unwrap();
-    // As many as may spin at a time, or as there are seats. None is left to this one unless they
-    // give it back.
+    // As many as may spin at a time, or as there are seats. This waiter can spin only when they
+    // give the right back.
     let cores = std::thread::available_parallelism().unwrap().get();
     let spinners: Vec<_> = (0..cores.min(8))
         .map(|_| process::start(&domain, "navigator-spins"))
         .collect();
     spinners.into_iter().for_each(Process::kill);
     bridge.sweep();
-    // On one core nobody may spin.
+    // On one core no waiter may spin.
     spins_under_quick_rings(&waiter);
 }
 
@@ -150,7 +151,7 @@ fn boards_are_joined_and_left_by_many_at_once() {
             scope.spawn(move || {
                 for _ in 0..200 {
                     let waiter = bus.waiter(Policy::Block).unwrap();
-                    waiter.ringer().unwrap().ring();
+                    waiter.ringer().ring();
                     assert_eq!(waiter.wait(LONG), Wake::Rung);
                 }
             });

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use lager_home::{Home, UnitName};
 use lager_ports::{
-    Bus, BusConfig, Cause, NodeInfo, NodeState, Place, Publisher, RobotName, Subscriber, nodes,
-    remove_stale_nodes,
+    Bus, BusConfig, Cause, NodeInfo, NodeState, Publisher, Subscriber, nodes, remove_stale_nodes,
 };
 use lager_topics::{LineFrame, Role, SensorLine};
 
-/// A bus nobody else is on. Dropping it proves that nothing of it is left.
+/// A bus that nobody else uses. Dropping it checks that nothing of it is left.
 pub(crate) struct Domain {
     pub(crate) config: BusConfig,
     own: lager_rig::Domain,
@@ -31,8 +31,8 @@ impl Domain {
         }
     }
 
-    pub(crate) fn place(&self) -> Place {
-        self.config.place().unwrap()
+    pub(crate) fn home(&self) -> Home {
+        self.config.home().unwrap()
     }
 
     pub(crate) fn open(&self, role: Role) -> Bus {
@@ -41,13 +41,13 @@ impl Domain {
 
     pub(crate) fn open_robot(&self, robot: &str, role: Role) -> Bus {
         let config = BusConfig {
-            robot: robot.parse::<RobotName>().unwrap(),
+            unit: robot.parse::<UnitName>().unwrap(),
             ..self.config.clone()
         };
         Bus::open(&config, role).unwrap()
     }
 
-    /// What processes have in shared memory on this bus.
+    /// The names of the bus's files in shared memory.
     pub(crate) fn in_shared_memory(&self) -> Vec<String> {
         let of_memory = |path: &&PathBuf| !path.starts_with(self.own.folder());
         let left = self.own.left();
@@ -76,8 +76,8 @@ impl Drop for Domain {
     }
 }
 
-/// Sweeps until nobody dead is left or a minute has passed; says which. A sweep gives up on a dead
-/// process when another one in this process, which other tests make, lasts long.
+/// Sweeps until no dead process is left or a minute has passed; returns whether none is left. A
+/// sweep gives up on a dead process while another test's sweep in this process is removing it.
 fn remove_all_stale_nodes(config: &BusConfig) -> bool {
     let start = Instant::now();
     loop {
@@ -92,7 +92,7 @@ fn remove_all_stale_nodes(config: &BusConfig) -> bool {
     }
 }
 
-/// Sweeps until `dead` processes have been removed, and not one more.
+/// Sweeps until exactly `dead` processes have been removed.
 #[track_caller]
 pub(crate) fn sweep(bus: &Bus, dead: usize) {
     let mut removed = 0;
@@ -103,7 +103,8 @@ pub(crate) fn sweep(bus: &Bus, dead: usize) {
     assert_eq!(removed, dead);
 }
 
-/// Waits until `done`; the watchdog against hanging for ever, not an assertion about time.
+/// Waits until `done`. Its time limit only keeps a test from hanging; it is no assertion about
+/// time.
 #[track_caller]
 pub(crate) fn until(what: &str, mut done: impl FnMut() -> bool) {
     let start = Instant::now();
@@ -116,7 +117,7 @@ pub(crate) fn until(what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
-/// A line frame that can be told from others.
+/// A line frame that `number` marks.
 pub(crate) fn frame(number: u32) -> LineFrame {
     LineFrame {
         link_epoch: number,
@@ -128,7 +129,7 @@ pub(crate) fn send(publisher: &Publisher<SensorLine>, number: u32) {
     publisher.send(Cause::OWN, frame(number)).unwrap();
 }
 
-/// Everything there is to receive.
+/// Receives all waiting samples.
 pub(crate) fn drain(subscriber: &mut Subscriber<SensorLine>) -> Vec<u32> {
     let mut numbers = Vec::new();
     while let Some(sample) = subscriber.receive().unwrap() {

@@ -1,22 +1,23 @@
-//! The examples as people run them, and what a process sees of them that was built without their
-//! topic.
+//! Runs the examples as people run them, and reads their topic in a process that was not built with
+//! it.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
 use lager_ports::{Difference, Layout, PortError};
-use lager_topics::{Qos, Role, SensorLine, Topic, payload};
+use lager_sample::{Qos, Topic, payload};
+use lager_topics::{Role, SensorLine};
 use serde_json::json;
 
 use crate::domain::{Domain, frame, until};
 
 payload! {
-    /// The same name as the examples' payload, and something else.
+    /// A payload with the same name as the examples' one, but another layout.
     pub struct Weather: 8 bytes {
         /// The wind has become a floating-point number.
         pub wind: f32,
-        /// From where it blows.
+        /// From where it blows, in degrees.
         pub from: u16,
         /// Fills the gap.
         pub reserved: [u8; 2],
@@ -28,7 +29,7 @@ struct OtherWeather;
 impl Topic for OtherWeather {
     const NAME: &'static str = "weather/now";
     type Payload = Weather;
-    const QOS: Qos = Qos::stream(16).waking(&[Role::Guest]);
+    const QOS: Qos = Qos::stream(16).waking(&[Role::Guest.part()]);
     const SUMMARY: &'static str = "The weather of another build.";
 }
 
@@ -59,7 +60,7 @@ impl Drop for Example {
     }
 }
 
-/// The program of an example, which `cargo test` builds beside its tests unless they were chosen by
+/// The program of an example. `cargo test` builds it beside its tests unless tests are chosen by
 /// name.
 fn built(name: &str) -> PathBuf {
     let deps = std::env::current_exe().unwrap();
@@ -143,7 +144,7 @@ fn what_a_slow_reader_of_a_found_topic_missed_is_counted() {
     let domain = Domain::new();
     let bus = domain.open(Role::Observer);
     let writer = domain.open(Role::Bridge);
-    // The topic is there before its writer, who then knows the reader from his first sample on.
+    // The topic exists before its writer, so the writer knows the reader from its first sample on.
     let _first = writer.subscriber::<SensorLine>().unwrap();
     let mut found = bus.found(SensorLine::NAME).unwrap().unwrap();
     let publisher = writer.publisher::<SensorLine>().unwrap();

@@ -1,5 +1,5 @@
-//! Stock iceoryx2 meets us: tools, bindings and other programs use its `ipc::Service`, not our
-//! service type, and must notice no difference.
+//! Plain iceoryx2 meets this crate: tools, bindings and other programs use `ipc::Service`, not this
+//! crate's service type, and must notice no difference.
 
 use std::time::Duration;
 
@@ -13,20 +13,22 @@ use iceoryx2::prelude::{
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
 use iceoryx2::service::port_factory::event;
-use lager_ports::{Cause, Clock, Difference, Peer, Policy, PortError, Wake};
+use lager_home::Clock;
+use lager_ports::{Cause, Difference, Peer, PortError};
+use lager_sample::{Qos, Request, Schema, Stamp, Topic};
 use lager_topics::{
-    Answer, Ask, BridgeRequest, LineFrame, NavStatus, NavigatorStatus, Qos, Request, Role, Schema,
-    SensorLine, Stamp, Topic,
+    Ask, BridgeAnswer, BridgeRequest, LineFrame, NavStatus, NavigatorStatus, Role, SensorLine,
 };
+use lager_wake::{Policy, Wake};
 
 use crate::domain::{Domain, frame, send};
 use crate::process;
 
-/// As a stock program reads it from what `lager config --iceoryx2` prints.
+/// The configuration, as a plain program reads it from the output of `lager config --iceoryx2`.
 fn config(domain: &Domain) -> Config {
-    // Each process has its own, as two may read theirs at once.
+    // Each process has its own file, because two may read theirs at once.
     let file = format!("iceoryx2.{}.toml", std::process::id());
-    let file = domain.place().folder().join(file);
+    let file = domain.home().folder().join(file);
     std::fs::write(&file, domain.config.iceoryx2_toml().unwrap()).unwrap();
     let path = FilePath::new(file.as_os_str().as_encoded_bytes()).unwrap();
     let config = Config::from_file(&path).unwrap();
@@ -108,8 +110,8 @@ fn our_subscribers_get_the_samples_of_a_stock_publisher_on_their_service() {
     let node = stock(&domain);
     let mut readers = [Role::Logic, Role::Observer]
         .map(|role| domain.open(role).subscriber::<SensorLine>().unwrap());
-    // A stock program that is to be acted upon writes to the actors' service too: no program moves
-    // the robot by writing to what others only watch.
+    // A plain program whose samples are to be acted upon must write to the actors' service too. So
+    // no program moves the robot by writing to the service that others only watch.
     let publishers = ["sensor/line:actors", SensorLine::NAME].map(|service| {
         let service = line_service(&node, service)
             .open_with_attributes(&schema::<LineFrame, Stamp>())
@@ -121,7 +123,7 @@ fn our_subscribers_get_the_samples_of_a_stock_publisher_on_their_service() {
             let mut sample = publishers[side].loan().unwrap();
             *sample.payload_mut() = frame(number);
             *sample.user_header_mut() = Stamp {
-                // Every third is missing.
+                // Every third number is missing.
                 sequence: u64::from(number) * 3 / 2,
                 epoch: 1,
                 writer: 7,
@@ -138,10 +140,17 @@ fn our_subscribers_get_the_samples_of_a_stock_publisher_on_their_service() {
     for reader in &readers {
         assert_eq!((reader.received(), reader.lost()), (500, 249));
     }
-    // It is one writer, as it is one program.
+    // It counts as one writer, because it is one program.
     let line = domain.open(Role::Observer).topics().unwrap().remove(0);
     assert_eq!((line.publishers, line.subscribers), (1, 2));
-    assert_eq!(line.writers, [Peer { role: None, pid: 0 }]);
+    assert_eq!(
+        line.writers,
+        [Peer {
+            part: None,
+            pid: 0,
+            observes: false,
+        }]
+    );
 }
 
 #[test]
@@ -214,7 +223,7 @@ fn a_topic_that_stock_made_is_ours_too() {
     let sample = subscriber.receive().unwrap().unwrap();
     assert_eq!(sample.payload().link_epoch, 5);
     assert_eq!(made.attributes().number_of_key_values(&key), 1);
-    // It does not say how its samples are laid out.
+    // The topic does not describe its samples.
     let found = bus.found(SensorLine::NAME).unwrap_err();
     let topic = SensorLine::NAME.to_owned();
     let difference = Difference::Undescribed;
@@ -242,7 +251,7 @@ fn stock_is_refused_with_another_layout() {
     );
 }
 
-/// The event service beside the line topic, as a stock process opens it that knows only its name.
+/// The event service beside the line topic, opened as by a plain process that knows only its name.
 fn line_events(node: &Node<ipc::Service>) -> event::PortFactory<ipc::Service> {
     node.service_builder(&name(SensorLine::NAME))
         .event()
@@ -250,7 +259,7 @@ fn line_events(node: &Node<ipc::Service>) -> event::PortFactory<ipc::Service> {
         .unwrap()
 }
 
-/// A stock listener there, with the node that keeps it.
+/// A plain listener on that service, with the node that keeps it alive.
 pub(crate) fn stock_listener_of_line(
     domain: &Domain,
 ) -> (Node<ipc::Service>, Listener<ipc::Service>) {
@@ -266,7 +275,7 @@ fn a_stock_listener_is_notified_of_every_sample() {
     let bus = domain.open(Role::Bridge);
     let early = bus.publisher::<SensorLine>().unwrap();
     let listener = line_events(&node).listener_builder().create().unwrap();
-    // One that comes after the listener tells it as well as one that was there before.
+    // A publisher that comes after the listener notifies it like an earlier one.
     let late = bus.publisher::<SensorLine>().unwrap();
     for publisher in [&early, &late, &early] {
         assert_eq!(listener.try_wait(|_| ()).unwrap(), 0);
@@ -280,7 +289,7 @@ fn a_stock_listener_is_notified_of_every_sample() {
             .unwrap();
         assert_eq!((rings, &told[..]), (1, &[0][..]));
     }
-    // When it has gone, sending goes on; and it may come back.
+    // When the listener is gone, sending goes on. The listener may come back.
     drop(listener);
     send(&early, 2);
     let listener = line_events(&node).listener_builder().create().unwrap();
@@ -330,8 +339,8 @@ fn stock_asks_and_our_server_answers() {
     let node = stock(&domain);
     let service = node
         .service_builder(&name(BridgeRequest::NAME))
-        .request_response::<Ask, Answer>()
-        .open_with_attributes(&schema::<Ask, Answer>())
+        .request_response::<Ask, BridgeAnswer>()
+        .open_with_attributes(&schema::<Ask, BridgeAnswer>())
         .unwrap();
     let client = service.client_builder().create().unwrap();
     let pending = client
@@ -340,9 +349,9 @@ fn stock_asks_and_our_server_answers() {
             ..Ask::default()
         })
         .unwrap();
-    let answer = |ask: &Ask| Answer {
+    let answer = |ask: &Ask| BridgeAnswer {
         gain_p: ask.gain_p,
-        ..Answer::default()
+        ..BridgeAnswer::default()
     };
     assert_eq!(server.serve(answer).unwrap(), 1);
     assert_eq!(pending.receive().unwrap().unwrap().payload().gain_p, 9);

@@ -1,11 +1,13 @@
-//! What tools see of the bus.
+//! What tools can find out about the bus.
 
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
-use lager_ports::{Bus, BusWatch, Layout, NodeState, Peer, Policy, nodes, remove_stale_nodes};
+use lager_home::BusWatch;
+use lager_ports::{Bus, Layout, NodeState, Peer, nodes, remove_stale_nodes};
 use lager_topics::{NavStatus, Role, SensorLine, TOPICS};
+use lager_wake::Policy;
 
 use crate::domain::{Domain, send};
 use crate::process;
@@ -29,7 +31,7 @@ fn topics_in_use_are_listed_with_their_ends() {
     assert_eq!(names, ["sensor/line", "nav/status"]);
 
     let line = &topics[0];
-    assert_eq!(line.robot.as_str(), "r1");
+    assert_eq!(line.unit.as_str(), "r1");
     assert_eq!(line.layout, Layout::Ours);
     assert_eq!(line.entry.unwrap().name, "sensor/line");
     assert_eq!((line.publishers, line.subscribers), (1, 3));
@@ -38,12 +40,14 @@ fn topics_in_use_are_listed_with_their_ends() {
     assert_eq!(
         line.writers,
         [Peer {
-            role: Some(Role::Bridge),
+            part: Some("bridge".into()),
+            observes: false,
             pid
         }]
     );
     assert!(line.readers.contains(&Peer {
-        role: Some(Role::Logic),
+        part: Some("logic".into()),
+        observes: false,
         pid
     }));
     assert_eq!((topics[1].publishers, topics[1].subscribers), (1, 0));
@@ -55,28 +59,29 @@ fn who_is_woken_by_a_topic_is_told() {
     let bridge = domain.open(Role::Bridge);
     let publisher = bridge.publisher::<SensorLine>().unwrap();
     let observer = domain.open(Role::Observer);
-    let woken = || observer.topics_of(observer.robot())[0].woken.clone();
+    let woken = || observer.topics_of(observer.unit())[0].woken.clone();
     assert_eq!(woken(), []);
 
     let logic = domain.open(Role::Logic);
     let waiter = logic.waiter(Policy::Block).unwrap();
     let _deaf_to_lines = bridge.waiter(Policy::Block).unwrap();
     let here = Peer {
-        role: Some(Role::Logic),
+        part: Some("logic".into()),
+        observes: false,
         pid: std::process::id(),
     };
-    assert_eq!(woken(), [here]);
+    assert_eq!(woken(), std::slice::from_ref(&here));
     let player = process::start(&domain, "navigator-waits");
     let there = Peer {
         pid: player.pid(),
-        ..here
+        ..here.clone()
     };
-    assert_eq!(woken(), [here, there]);
+    assert_eq!(woken(), [here.clone(), there]);
 
-    // A killed one is not shown, although nobody has swept yet and its seat is still rung.
+    // A killed process is not shown, although nobody has swept yet and its seat is still rung.
     player.kill();
     send(&publisher, 0);
-    assert_eq!(woken(), [here]);
+    assert_eq!(woken(), std::slice::from_ref(&here));
     drop(waiter);
     assert_eq!(woken(), []);
 }
@@ -85,15 +90,15 @@ fn who_is_woken_by_a_topic_is_told() {
 fn looking_does_not_create_topics() {
     let domain = Domain::new();
     let observer = domain.open(Role::Observer);
-    let all = observer.topics_of(observer.robot());
+    let all = observer.topics_of(observer.unit());
     assert_eq!(all.len(), TOPICS.len());
     assert!(all.iter().all(|topic| topic.layout == Layout::Unused));
     assert!(observer.topics().unwrap().is_empty());
 }
 
-/// Whether a watch tells of a change, twice as it does, and then of none.
+/// Whether a watch reports a change, in two calls as it must, and then no change.
 fn tells(watch: &mut BusWatch, observer: &Bus) -> bool {
-    let told = [(); 3].map(|()| watch.has_changed(observer.place()));
+    let told = [(); 3].map(|()| watch.has_changed(observer.home()));
     assert!(
         [[true, true, false], [false; 3]].contains(&told),
         "{told:?}"
@@ -110,7 +115,7 @@ fn a_watch_tells_when_services_come_and_go() {
     let bridge = domain.open(Role::Bridge);
     let writer = bridge.publisher::<SensorLine>().unwrap();
     assert!(tells(&mut watch, &observer), "it has come");
-    // A reader of a topic that is there changes no service.
+    // A new reader of an existing topic changes no service.
     let reader = observer.subscriber::<SensorLine>().unwrap();
     assert!(!tells(&mut watch, &observer));
     drop((writer, reader));
@@ -130,7 +135,7 @@ fn a_watch_tells_when_ports_come_and_go() {
     assert!(tells(&mut watch, &observer), "a reader");
     drop(reader);
     assert!(tells(&mut watch, &observer), "the reader has gone");
-    // A look at the topics opens them all, which is no change.
+    // Looking at the topics opens them all, which is not a change.
     observer.topics().unwrap();
     assert!(!tells(&mut watch, &observer));
     drop((writer, bridge));
@@ -149,11 +154,11 @@ fn topics_of_other_robots_are_seen_by_name() {
         .topics()
         .unwrap()
         .into_iter()
-        .map(|topic| (topic.robot.to_string(), topic.publishers, topic.subscribers))
+        .map(|topic| (topic.unit.to_string(), topic.publishers, topic.subscribers))
         .collect();
     assert_eq!(seen, [("r1".to_owned(), 0, 1), ("r2".to_owned(), 1, 0)]);
 
-    let line = &observer.topics_of(other.robot())[0];
+    let line = &observer.topics_of(other.unit())[0];
     assert_eq!((line.publishers, line.subscribers), (1, 0));
 }
 
@@ -167,8 +172,8 @@ fn processes_are_listed_with_robot_and_role() {
         .iter()
         .map(|node| {
             (
-                node.robot.as_ref().unwrap().as_str(),
-                node.role.unwrap(),
+                node.unit.as_ref().unwrap().as_str(),
+                node.part.as_deref().unwrap(),
                 node.pid,
                 node.state,
             )
@@ -178,8 +183,8 @@ fn processes_are_listed_with_robot_and_role() {
     assert_eq!(
         seen,
         [
-            ("r1", Role::Bridge, pid, NodeState::Alive),
-            ("r2", Role::Logic, pid, NodeState::Alive)
+            ("r1", "bridge", pid, NodeState::Alive),
+            ("r2", "logic", pid, NodeState::Alive)
         ]
     );
     assert_eq!(listed[0].name, format!("lager/r1/bridge/{pid}"));
@@ -197,7 +202,10 @@ fn a_killed_process_is_listed_as_stale_until_it_is_removed() {
     let left = nodes(&domain.config).unwrap();
     assert_eq!(left.len(), 1);
     assert_eq!(left[0].state, NodeState::Stale);
-    assert_eq!((left[0].role, left[0].pid), (Some(Role::Bridge), pid));
+    assert_eq!(
+        (left[0].part.as_deref(), left[0].pid),
+        (Some("bridge"), pid)
+    );
     assert_ne!(domain.in_shared_memory(), Vec::<String>::new());
 
     assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 1);
@@ -206,9 +214,9 @@ fn a_killed_process_is_listed_as_stale_until_it_is_removed() {
     assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 0);
 }
 
-/// Where the transport keeps the tags and details of the only node.
+/// The folder in which the transport keeps the tags and details of the only node.
 fn node_folder(domain: &Domain) -> PathBuf {
-    let nodes = domain.place().transport_folder().join("nodes");
+    let nodes = domain.home().transport_folder().join("nodes");
     let entries = std::fs::read_dir(nodes).unwrap().map(Result::unwrap);
     let mut folders = entries
         .map(|entry| entry.path())
@@ -222,10 +230,10 @@ fn node_folder(domain: &Domain) -> PathBuf {
 fn a_process_killed_while_it_writes_a_tag_is_removed() {
     let domain = Domain::new();
     process::start(&domain, "line-writer").kill();
-    let name = format!("{}7.port_tag", domain.place().prefix());
+    let name = format!("{}7.port_tag", domain.home().prefix());
     let tag = node_folder(&domain).join(name);
     std::fs::write(&tag, "").unwrap();
-    // As it is while the transport writes.
+    // As it is while the transport writes it.
     std::fs::set_permissions(&tag, Permissions::from_mode(0o600)).unwrap();
     assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 1);
     assert_eq!(nodes(&domain.config).unwrap(), []);

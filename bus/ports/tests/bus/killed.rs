@@ -4,11 +4,12 @@ use std::path::Path;
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use lager_ports::{CallError, Cause, KeptError, Policy, Wake};
+use lager_ports::{CallError, Cause, KeptError};
+use lager_sample::Topic;
 use lager_topics::{
     Ask, BridgeRequest, NavStatus, NavigatorStatus, Outcome, Role, SensorLine, SteeringCommand,
-    Topic,
 };
+use lager_wake::{Policy, Wake};
 
 use crate::domain::{Domain, drain, send, sweep, until};
 use crate::process;
@@ -28,7 +29,7 @@ fn a_killed_process_is_swept_at_the_next_open() {
     let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
     let publisher = bus.publisher::<SensorLine>().unwrap();
     send(&publisher, 1);
-    // Nothing of what the killed writer had sent, and no gap where it was.
+    // The killed writer's samples do not arrive, and they are not counted as a gap.
     assert_eq!(drain(&mut subscriber), [1]);
     assert_eq!((subscriber.received(), subscriber.lost()), (1, 0));
 }
@@ -39,7 +40,7 @@ fn a_sweep_counts_the_dead_and_leaves_the_living_alone() {
     let bus = domain.open(Role::Supervisor);
     let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
     let living = process::start(&domain, "line-writer");
-    // Opening sweeps too, so both start before either dies.
+    // Opening the bus sweeps too, so both start before either dies.
     let reader = process::start(&domain, "line-reader");
     let bridge = process::start(&domain, "deaf-bridge");
     reader.kill();
@@ -71,7 +72,7 @@ fn places_of_killed_writers_are_taken_again() {
     let domain = Domain::new();
     let reader = domain.open(Role::Logic);
     let mut subscriber = reader.subscriber::<SensorLine>().unwrap();
-    // All start before any is swept; opening sweeps, so they are killed together.
+    // All start before any is swept. Opening the bus sweeps, so they are killed together.
     let writers: Vec<_> = (0..SensorLine::QOS.max_publishers())
         .map(|_| process::start(&domain, "line-writer"))
         .collect();
@@ -100,7 +101,7 @@ fn what_a_killed_writer_has_sent_survives_the_sweep_if_its_reader_had_met_it() {
     let bus = domain.open(Role::Logic);
     let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
     let writer = process::start(&domain, "line-writer");
-    // One sample is enough to meet; nine stay unread.
+    // After one sample they have met; nine samples stay unread.
     assert_eq!(subscriber.receive().unwrap().unwrap().link_epoch, 0);
     writer.kill();
     sweep(&bus, 1);
@@ -172,7 +173,7 @@ fn the_last_value_of_a_killed_service_is_handed_to_its_successor() {
     keeper.hand_over().unwrap();
     assert!(keeper.is_standing_in());
 
-    // An observer that has been there all along and a new one see the same old value.
+    // An observer that was there from the start and a new one see the same old value.
     let mut observer = domain
         .open(Role::Observer)
         .subscriber::<NavStatus>()
@@ -231,7 +232,7 @@ fn a_keeper_withdraws_when_the_successor_speaks() {
     assert!(!keeper.is_standing_in());
     assert_eq!(keeper.value().unwrap().0.order_id, 9);
 
-    // From now on a newcomer sees the successor's value only.
+    // From now on a newcomer sees only the successor's value.
     let mut observer = domain
         .open(Role::Observer)
         .subscriber::<NavStatus>()
@@ -255,7 +256,7 @@ fn a_kept_value_that_cannot_be_read_is_not_taken_for_none() {
         }
     }
     let bus = domain.open(Role::Logic);
-    // It is told at once, not when the time is over.
+    // The error comes at once, not when the time is over.
     let hour = Duration::from_secs(3600);
     let error = bus.kept::<NavStatus>(hour).unwrap_err();
     assert!(matches!(error, KeptError::Unreadable { .. }), "{error}");
@@ -282,7 +283,7 @@ fn a_hand_over_that_failed_is_tried_again() {
     keeper.remember().unwrap();
     assert!(keeper.is_standing_in());
     let mut successor = others.subscriber::<NavStatus>().unwrap();
-    // Who comes late is served at the next look.
+    // A reader that comes late gets the value at the keeper's next `remember`.
     keeper.remember().unwrap();
     assert_eq!(successor.latest().unwrap().unwrap().order_id, 7);
 }
@@ -310,7 +311,7 @@ fn an_asker_survives_the_killing_of_its_server() {
         let bridge = process::start(&domain, "bridge");
         assert_eq!(client.call(ask, LONG).unwrap().gain_p, 3);
         bridge.kill();
-        // Nobody has swept yet: the dead server seems to be there but does not answer.
+        // Nobody has swept yet, so the dead server seems to be there but does not answer.
         for _ in 0..20 {
             let error = client.call(ask, Duration::from_millis(1)).unwrap_err();
             assert!(matches!(error, CallError::NoAnswer { .. }), "{error:?}");
@@ -344,13 +345,13 @@ fn a_server_survives_the_killing_of_its_askers() {
     let domain = Domain::new();
     let bridge = domain.open(Role::Bridge);
     let server = bridge.server::<BridgeRequest>().unwrap();
-    let answer = |_: &Ask| lager_topics::Answer::default();
+    let answer = |_: &Ask| lager_topics::BridgeAnswer::default();
     for swept in [false, true] {
         process::start(&domain, "asker").kill();
         if swept {
             bridge.sweep();
         }
-        // Answering a dead asker, or finding its question gone, is no error.
+        // It is not an error if the asker is dead or its request is gone.
         server.serve(answer).unwrap();
     }
     std::thread::scope(|scope| {

@@ -1,4 +1,4 @@
-//! Places, and who is refused: too many observers, another layout, another version's files.
+//! Places and refusals: too many observers, another layout, another version's files.
 
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_ports::{Bus, Cause, OpenError, Policy, PortError, Wake};
-use lager_topics::{
-    DistanceFrame, Field, FieldInfo, LineFrame, Make, OBSERVERS, Payload, Qos, Role, Schema,
-    SensorLine, SteeringCommand, Topic,
-};
+use lager_home::HomeError;
+use lager_ports::{Bus, Cause, OpenError, PortError};
+use lager_sample::{Field, FieldInfo, Make, Payload, Qos, Schema, Topic};
+use lager_topics::{DistanceFrame, LineFrame, Role, SensorLine, SteeringCommand};
+use lager_wake::{Policy, Wake};
 use serde::{Deserialize, Serialize};
 
 use crate::domain::{Domain, drain, send};
@@ -20,7 +20,7 @@ fn sixty_four_observers_attach_and_the_next_is_told_why_not() {
     let domain = Domain::new();
     let bridge = domain.open(Role::Bridge);
     let publisher = bridge.publisher::<SensorLine>().unwrap();
-    let mut observers: Vec<_> = (0..OBSERVERS)
+    let mut observers: Vec<_> = (0..SensorLine::QOS.observers)
         .map(|index| {
             let role = [Role::Observer, Role::Monitor, Role::Recorder][index % 3];
             domain.open(role).subscriber::<SensorLine>().unwrap()
@@ -40,7 +40,7 @@ fn sixty_four_observers_attach_and_the_next_is_told_why_not() {
     );
     assert!(refused.to_string().contains("already has 64 observers"));
 
-    // Observers never keep those who act from working, not even a second time.
+    // Observers never keep an actor from working, nor its successor.
     let mut logic = domain.open(Role::Logic).subscriber::<SensorLine>().unwrap();
     let mut successor = domain.open(Role::Logic).subscriber::<SensorLine>().unwrap();
     let mut station = domain
@@ -96,12 +96,12 @@ fn too_many_waiters_are_refused_and_a_free_seat_can_be_taken() {
     assert_eq!(
         refused,
         PortError::TooManyWaiters {
-            role: Role::Logic,
+            part: Role::Logic.part(),
             limit: 8
         }
     );
     assert!(refused.to_string().contains("stop a logic that runs twice"));
-    // Another role has seats of its own.
+    // Another role has its own seats.
     assert!(domain.open(Role::Bridge).waiter(Policy::Block).is_ok());
     waiters.remove(3);
     assert!(buses[1].waiter(Policy::Block).is_ok());
@@ -109,7 +109,7 @@ fn too_many_waiters_are_refused_and_a_free_seat_can_be_taken() {
 
 /// The file of the bell board.
 fn board_of(domain: &Domain) -> PathBuf {
-    let board = domain.place().folder().join("r1/bells");
+    let board = domain.home().folder().join("r1/bells");
     assert!(board.exists(), "somebody waits");
     board
 }
@@ -133,12 +133,12 @@ fn a_board_of_another_build_is_refused_while_it_is_in_use_and_replaced_afterward
     );
     assert!(refused.to_string().contains("another build"));
 
-    // Left behind by a build that is gone, it is in nobody's way.
+    // A board that a build has left behind, and that nobody uses, does no harm.
     drop(waiter);
     for left in [&other[..], &intact[..100], &[]] {
         std::fs::write(&board, left).unwrap();
         let waiter = newcomer.waiter(Policy::Block).unwrap();
-        let ringer = waiter.ringer().unwrap();
+        let ringer = waiter.ringer();
         ringer.ring();
         assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
     }
@@ -154,7 +154,7 @@ impl Topic for OtherType {
     const SUMMARY: &'static str = "A line topic of another build.";
 }
 
-/// A line frame whose fields were exchanged: the same name, size and alignment.
+/// A line frame with its fields exchanged: the same name, size and alignment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct ExchangedFields {
@@ -235,7 +235,7 @@ fn a_changed_layout_is_refused_with_a_sentence() {
     assert!(is_refused::<OtherFields>(&domain).contains("another build of lager is running"));
     assert!(is_refused::<OtherBuffer>(&domain).contains("another build of lager is running"));
 
-    // Those who agree are not disturbed.
+    // Processes with the right layout are not disturbed.
     let mut logic = domain.open(Role::Logic).subscriber::<SensorLine>().unwrap();
     send(&publisher, 1);
     assert_eq!(drain(&mut logic), [1]);
@@ -285,7 +285,7 @@ fn a_topic_whose_creator_was_killed_half_way_is_made_anew() {
         description_of_line(&domain)
     };
     assert!(!description.exists(), "the last user removes the topic");
-    // This is what lies there between the first and the last step of the creation.
+    // The file looks like this between the first and the last step of its creation.
     std::fs::write(&description, []).unwrap();
     std::fs::set_permissions(&description, Permissions::from_mode(0o600)).unwrap();
 
@@ -295,7 +295,7 @@ fn a_topic_whose_creator_was_killed_half_way_is_made_anew() {
     assert_eq!(drain(&mut subscriber), [4]);
 }
 
-/// Replaces the contents of a file that is only readable, and leaves it so.
+/// Replaces the contents of a read-only file and leaves it read-only.
 fn overwrite(path: &Path, contents: &[u8]) {
     let permissions = std::fs::metadata(path).unwrap().permissions();
     std::fs::set_permissions(path, Permissions::from_mode(0o600)).unwrap();
@@ -314,7 +314,7 @@ fn a_folder_of_the_greatest_length_carries_a_whole_robot() {
     let refused = Bus::open(&too_long.config, Role::Bridge).unwrap_err();
     std::fs::remove_dir(folder_of(60)).unwrap();
     std::mem::forget(too_long);
-    let OpenError::FolderTooLong { limit, .. } = refused else {
+    let OpenError::Home(HomeError::FolderTooLong { limit, .. }) = refused else {
         panic!("60 bytes are too many: {refused}");
     };
 

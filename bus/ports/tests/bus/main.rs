@@ -1,6 +1,6 @@
 //! The bus as its users meet it: real shared memory, real processes, real `kill -9`.
 //!
-//! Every test has a bus of its own and checks at its end that nothing is left of it.
+//! Every test has a bus of its own and checks at its end that nothing of it is left.
 
 mod actors;
 mod bells;

@@ -1,4 +1,4 @@
-//! Other processes: this test binary started again, as one of a robot's until it is killed.
+//! Other processes: starts this test program again as a process of a robot, until a test kills it.
 
 use std::mem::ManuallyDrop;
 use std::path::PathBuf;
@@ -6,13 +6,14 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use lager_ports::{Bus, Cause, Policy};
+use lager_ports::{Bus, Cause};
 use lager_rig::process::{end_with_parent, ready};
 use lager_rig::{Parent, Process, bus_at};
 use lager_topics::{
-    Answer, BridgeRequest, Health, LinkHealth, NavStatus, NavigatorStatus, Outcome, Role,
+    BridgeAnswer, BridgeRequest, Health, LinkHealth, NavStatus, NavigatorStatus, Outcome, Role,
     SensorLine, SteeringCommand,
 };
+use lager_wake::Policy;
 
 use crate::domain::{Domain, frame};
 use crate::swept::stranger;
@@ -25,7 +26,7 @@ pub(crate) fn start(domain: &Domain, name: &str) -> Process {
     process
 }
 
-/// The bus's folder, as the parent has told it.
+/// The bus's folder, which the parent passes on.
 static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 
 fn folder() -> PathBuf {
@@ -91,7 +92,7 @@ fn child() {
             end_with_parent();
         }
         "stranger" => {
-            // The parent tidies up.
+            // The parent cleans up.
             let domain = ManuallyDrop::new(Domain::at(folder()));
             let ends = AtomicBool::new(false);
             std::thread::scope(|scope| {
@@ -101,7 +102,7 @@ fn child() {
                 });
                 stranger(&domain, ready, &ends);
             });
-            // Nobody reads what a test says at its end.
+            // Nobody reads the output at the end of a test.
             std::process::exit(0);
         }
         "onlooker" => {
@@ -123,7 +124,7 @@ fn child() {
             end_with_parent();
         }
         "navigator-waits" => {
-            // Sleeps whenever it is let.
+            // Sleeps whenever it can.
             let bus = open(Role::Logic);
             let waiter = bus.waiter(Policy::Block).unwrap();
             std::thread::spawn(|| end_with_parent());
@@ -133,7 +134,7 @@ fn child() {
             }
         }
         "navigator-hurries" => {
-            // Wakes and sleeps as fast as it is rung.
+            // Wakes and sleeps as fast as others ring.
             let bus = open(Role::Logic);
             let waiter = bus.waiter(Policy::Block).unwrap();
             std::thread::spawn(|| end_with_parent());
@@ -147,7 +148,7 @@ fn child() {
             let bus = open(Role::Logic);
             let waiter = bus.waiter(Policy::ADAPTIVE).unwrap();
             std::thread::spawn(|| end_with_parent());
-            let ringer = waiter.ringer().unwrap();
+            let ringer = waiter.ringer();
             std::thread::spawn(move || {
                 loop {
                     ringer.ring();
@@ -173,7 +174,7 @@ fn child() {
             }
         }
         "deaf-bridge" => {
-            // Acts on steering/command and answers requests, but does neither.
+            // Should act on steering/command and answer requests, but does neither.
             let bus = open(Role::Bridge);
             let _waiter = bus.waiter(Policy::Block).unwrap();
             let _subscriber = bus.subscriber::<SteeringCommand>().unwrap();
@@ -190,16 +191,16 @@ fn child() {
             loop {
                 waiter.wait(Duration::from_millis(20));
                 server
-                    .serve(|ask| Answer {
+                    .serve(|ask| BridgeAnswer {
                         outcome: Outcome::Done.into(),
                         gain_p: ask.gain_p,
-                        ..Answer::default()
+                        ..BridgeAnswer::default()
                     })
                     .unwrap();
             }
         }
         "asker" => {
-            // Asks and is killed before anybody answers.
+            // Asks, and is killed before anybody answers.
             let bus = open(Role::Operator);
             let client = bus.client::<BridgeRequest>().unwrap();
             std::thread::spawn(|| {

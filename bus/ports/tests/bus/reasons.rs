@@ -1,9 +1,10 @@
-//! What a waiter is told of the rings that ended its wait.
+//! What a waiter can find out about the rings that ended its wait.
 
 use std::time::Duration;
 
-use lager_ports::{Cause, Policy, Wake};
+use lager_ports::Cause;
 use lager_topics::{LinkHealth, Role, SensorDistance, SensorLine};
+use lager_wake::{Policy, Wake};
 
 use crate::domain::{Domain, send};
 
@@ -28,12 +29,12 @@ fn a_waiter_is_told_which_topics_it_is_rung_for() {
     distance.send(Cause::OWN, Default::default()).unwrap();
     assert_eq!(waiter.wait(LONG), Wake::Rung);
     assert_eq!(has(), (false, true));
-    waiter.ringer().unwrap().ring();
+    waiter.ringer().ring();
     assert_eq!(waiter.wait(LONG), Wake::Rung);
     assert_eq!(has(), (false, false));
     assert!(waiter.has_inside());
 
-    // What was not asked for at one wake is still there at the next.
+    // A reason that was not read at one wake is still there at the next.
     send(&line, 1);
     assert_eq!(waiter.wait(LONG), Wake::Rung);
     distance.send(Cause::OWN, Default::default()).unwrap();
@@ -64,7 +65,7 @@ fn a_sample_without_a_ring_wakes_nobody_and_is_found_among_rings_for_others() {
     assert!(subscriber.receive().unwrap().is_some());
 
     health.loan().unwrap().send_quietly().unwrap();
-    // Without the reason that it has left, it is as if somebody who knows of no bells had sent it.
+    // Without its reason, the sample looks as if a program that knows no bells had sent it.
     send(&line, 2);
     assert_eq!(waiter.wait(LONG), Wake::Rung);
     assert!(waiter.has::<LinkHealth>());

@@ -1,25 +1,27 @@
-//! Requests and replies.
+//! Requests and replies between processes that come and go.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use lager_ports::{Bus, CallError, Policy};
-use lager_topics::{Answer, Ask, AskKind, BridgeRequest, Mode, Outcome, Role};
+use lager_orders::Mode;
+use lager_ports::{Bus, CallError};
+use lager_topics::{Ask, AskKind, BridgeAnswer, BridgeRequest, Outcome, Role};
+use lager_wake::Policy;
 
 use crate::domain::{Domain, until};
 
 const LONG: Duration = Duration::from_secs(60);
 
-fn answer(ask: &Ask) -> Answer {
-    Answer {
+fn answer(ask: &Ask) -> BridgeAnswer {
+    BridgeAnswer {
         outcome: Outcome::Done.into(),
         mode: ask.mode,
         gain_p: ask.gain_p,
-        ..Answer::default()
+        ..BridgeAnswer::default()
     }
 }
 
-/// A bridge that answers until told to stop; returns how much it answered.
+/// A bridge that answers until `stop`; returns how many requests it has answered.
 fn serve(bus: &Bus, stop: &AtomicBool) -> usize {
     let waiter = bus.waiter(Policy::Block).unwrap();
     let server = bus.server::<BridgeRequest>().unwrap();
@@ -130,7 +132,7 @@ fn a_question_whose_asker_has_given_up_is_not_carried_out() {
     assert!(matches!(error, CallError::NoAnswer { .. }), "{error:?}");
     assert_eq!(server.serve(answer).unwrap(), 0);
 
-    // The next one is.
+    // The next request is answered.
     std::thread::scope(|scope| {
         let asking = scope.spawn(|| {
             let client = station.client::<BridgeRequest>().unwrap();

@@ -1,10 +1,13 @@
-//! What is sent and what arrives.
+//! Sending and receiving: order, loss, history and limits.
 
 use std::sync::Barrier;
 use std::time::Duration;
 
-use lager_ports::{Bus, BusConfig, Cause, Clock, Policy, ReceiveError, SendError, Wake};
-use lager_topics::{NavStatus, NavigatorStatus, OperatorInput, Role, SensorLine, Topic};
+use lager_home::Clock;
+use lager_ports::{Bus, BusConfig, Cause, ReceiveError, SendError};
+use lager_sample::Topic;
+use lager_topics::{NavStatus, NavigatorStatus, OperatorInput, Role, SensorLine};
+use lager_wake::{Policy, Wake};
 
 use crate::domain::{Domain, drain, send};
 
@@ -104,7 +107,7 @@ fn who_sleeps_through_a_thousand_samples_knows_how_many_he_missed() {
     assert_eq!(subscriber.received(), 256);
     assert_eq!(subscriber.lost(), 744);
 
-    // Awake, he misses nothing; asleep again, he counts on.
+    // While it reads it misses nothing; when it sleeps again, it counts on.
     send(&publisher, 1000);
     assert_eq!(drain(&mut subscriber), [1000]);
     assert_eq!(subscriber.lost(), 744);
@@ -118,7 +121,7 @@ fn who_sleeps_through_a_thousand_samples_knows_how_many_he_missed() {
 #[test]
 fn each_writer_is_counted_for_itself() {
     let domain = Domain::new();
-    let bus = domain.open(Role::Bridge);
+    let bus = domain.open(Role::Logic);
     let mut subscriber = bus.subscriber::<OperatorInput>().unwrap();
     let one = bus.publisher::<OperatorInput>().unwrap();
     let two = bus.publisher::<OperatorInput>().unwrap();
@@ -129,7 +132,7 @@ fn each_writer_is_counted_for_itself() {
         }
     }
     while subscriber.receive().unwrap().is_some() {}
-    // Each writer has a buffer of 16 of its own.
+    // Each writer has its own queue of 16.
     assert_eq!(subscriber.lost(), 4);
     assert_eq!(subscriber.received(), 16 + 10);
     assert_eq!(subscriber.writers_heard(), 2);
@@ -254,7 +257,7 @@ fn a_state_reaches_late_joiners_while_its_writer_waits() {
     assert!(late.latest().unwrap().is_none());
     assert_eq!(waiter.wait(Duration::from_millis(1)), Wake::TimedOut);
     assert_eq!(late.latest().unwrap().unwrap().stamp().sequence, 0);
-    // The state of a writer that is gone is nobody's any more.
+    // Nobody gets the state of a writer that is gone.
     drop(publisher);
     assert_eq!(waiter.wait(Duration::from_millis(1)), Wake::TimedOut);
     assert!(late.latest().unwrap().is_none());
@@ -280,7 +283,7 @@ fn the_latest_keeps_what_came_before_a_failure() {
     for value in 1..=6 {
         send(&publisher, value);
     }
-    // With one more held, the next cannot be received.
+    // The reader holds one more, so it cannot receive the next.
     let held: Vec<_> = (0..3)
         .map(|_| subscriber.receive().unwrap().unwrap())
         .collect();
@@ -363,7 +366,7 @@ fn a_bus_is_shared_between_threads_and_ports_are_made_in_theirs() {
                     send(&publisher, thread * 100 + number);
                 }
                 sent.wait();
-                // A publisher that leaves before it was heard at all is forgotten.
+                // A publisher that leaves before anybody has heard it is forgotten.
                 read.wait();
             });
         }
@@ -403,7 +406,7 @@ fn processes_that_come_and_go_at_once_agree_on_one_topic() {
                 for _ in 0..10 {
                     // All create the topic at once, and all leave it at once.
                     together.wait();
-                    let bus = domain.open(Role::Bridge);
+                    let bus = domain.open(Role::Logic);
                     let mut subscriber = bus.subscriber::<OperatorInput>().unwrap();
                     together.wait();
                     let publisher = bus.publisher::<OperatorInput>().unwrap();

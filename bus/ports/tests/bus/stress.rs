@@ -1,32 +1,31 @@
-//! Rings by the million, and the search for one that is lost.
+//! Rings millions of times and searches for a ring that is lost.
 //!
-//! Rounds of random length: two ringers ring four waiters at random, with random pauses, and then
-//! fall silent until every waiter has answered its last ring. No later ring can make up for a lost
-//! one, and no time-out either, since three of the waiters wait a minute. So a waiter that has not
-//! answered a second after the round has slept through a ring. The fourth waits for short, random
-//! times, so that time-outs and rings meet, and answers only when a ring ends its wait.
+//! Rounds of random length: two ringers ring four waiters at random, with random pauses. Then they
+//! stop until every waiter has answered its last ring. No later ring can make up for a lost one,
+//! nor can a time-out, because three of the waiters wait a minute. So a waiter that has not
+//! answered a second after the round has slept through a ring. The fourth waiter waits for short,
+//! random times, so that time-outs and rings meet, and answers only when a ring ends its wait.
 
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Policy, Ringer, Wake};
 use lager_topics::Role;
+use lager_wake::{Policy, Ringer, Wake};
 
 use crate::domain::Domain;
 
-/// Rings in an ordinary test run. `tests/run` asks for more in a release build, and a soak for many
-/// more.
+/// Rings in an ordinary test run. `tests/run` makes more in a release build, and a soak many more.
 const RINGS: u64 = 1_000_000;
 const RINGS_VARIABLE: &str = "LAGER_SOAK_RINGS";
 
 const RINGERS: usize = 2;
 const WAITERS: usize = 4;
 
-/// A waiter asleep so long after its last ring has lost it.
+/// A waiter that still sleeps this long after its last ring has lost it.
 const LOST: Duration = Duration::from_secs(1);
 
-/// xorshift64: pauses need no better chance.
+/// xorshift64, which is random enough for pauses.
 struct Dice(u64);
 
 impl Dice {
@@ -41,7 +40,7 @@ impl Dice {
         self.0 % sides
     }
 
-    /// Nothing, most times; else some spins, or now and then a place behind everybody else.
+    /// Mostly no pause, sometimes a short spin, and now and then a yield to all other threads.
     fn pause(&mut self) {
         match self.below(256) {
             0 => std::thread::yield_now(),
@@ -53,9 +52,9 @@ impl Dice {
 
 #[derive(Default)]
 struct Seat {
-    /// Rings this waiter was given; counted before the ring.
+    /// Rings given to this waiter; counted before the ring.
     asked: AtomicU64,
-    /// The count that it found after the last wait that ended by a ring.
+    /// The value of `asked` after the last wait that a ring ended.
     answered: AtomicU64,
     /// The waiter's thread.
     thread: AtomicI32,
@@ -66,11 +65,11 @@ impl Seat {
         self.answered.load(Ordering::Acquire) != self.asked.load(Ordering::Acquire)
     }
 
-    /// Whether the kernel has put it to sleep; one that only waits for a core is not lost.
+    /// Whether the kernel lets it sleep. A waiter that only waits for a core has lost nothing.
     fn is_asleep(&self) -> bool {
         let thread = self.thread.load(Ordering::Acquire);
         let state = std::fs::read_to_string(format!("/proc/self/task/{thread}/stat")).unwrap();
-        // The state follows the name, which stands in brackets.
+        // The state follows the name. The name is in parentheses.
         state[state.rfind(')').unwrap() + 1..]
             .trim()
             .starts_with('S')
@@ -101,10 +100,10 @@ fn no_waiter_sleeps_through_a_ring() {
                     Policy::ADAPTIVE,
                     Policy::Block,
                 ];
-                // Each on a bus of its own, as processes are.
+                // Each waiter is on a bus of its own, like processes.
                 let bus = domain.open([Role::Logic, Role::Bridge][index % 2]);
                 let waiter = bus.waiter(policy[index]).unwrap();
-                send.send((index, waiter.ringer().unwrap())).unwrap();
+                send.send((index, waiter.ringer())).unwrap();
                 let thread = rustix::thread::gettid().as_raw_nonzero().get();
                 seat.thread.store(thread, Ordering::Release);
                 let mut dice = Dice::new(index);
@@ -145,7 +144,7 @@ fn no_waiter_sleeps_through_a_ring() {
                         if together.wait().is_leader() {
                             lost.fetch_add(unanswered(seats), Ordering::AcqRel);
                         }
-                        // So that both see the same and leave in the same round.
+                        // So that both see the same state and leave in the same round.
                         together.wait();
                     }
                 })
@@ -162,11 +161,11 @@ fn no_waiter_sleeps_through_a_ring() {
     println!("{given} rings, {sleeps} sleeps");
     assert_eq!(lost.into_inner(), 0, "waiters slept through a ring");
     assert!(given >= rings);
-    // Otherwise it was no test of sleeping.
+    // Otherwise the test would not have tested sleeping.
     assert!(sleeps > rings / 1000, "only {sleeps} sleeps");
 }
 
-/// Waits until everybody has answered the last ring, and says how many sleep instead.
+/// Waits until all waiters have answered the last ring; returns how many sleep instead.
 fn unanswered(seats: &[Seat]) -> u64 {
     let start = Instant::now();
     while seats.iter().any(Seat::is_silent) {

@@ -1,4 +1,4 @@
-//! Sweeping takes only what is proven dead: others on the bus notice nothing of it.
+//! Sweeping removes only what is certainly dead. Others on the bus notice nothing of it.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -29,9 +29,9 @@ fn count(node: &Node<ipc::Service>) -> Subscriber<ipc::Service, u64, ()> {
     service.subscriber_builder().create().unwrap()
 }
 
-/// A process of plain iceoryx2 in the robot's domain. It ends at the first thing that is not as it
-/// left it: a sample or an event that does not arrive, a service that cannot be made or found, its
-/// own node not listed as alive.
+/// A process of plain iceoryx2 on the robot's bus. It ends when anything has changed without its
+/// doing: a sample or an event does not arrive, a service cannot be made or found, or its own node
+/// is not listed as alive.
 pub(crate) fn stranger(domain: &Domain, ready: impl Fn(), ends: &AtomicBool) {
     let node = stock(domain);
     let mut count = count(&node);
@@ -50,7 +50,8 @@ pub(crate) fn stranger(domain: &Domain, ready: impl Fn(), ends: &AtomicBool) {
             .unwrap();
         let heard = listener.timed_wait(|_| (), Duration::from_secs(60));
         assert_eq!(heard.unwrap(), 1);
-        // Descriptions and segments that are unfinished for a moment, also while others sweep.
+        // Makes descriptions and segments that are unfinished for a moment, also while others
+        // sweep.
         let passing = node.service_builder(&named(&format!("stranger/passing/{number}")));
         let passing = passing.publish_subscribe::<u64>().create().unwrap();
         let port = passing.publisher_builder().create().unwrap();
@@ -99,7 +100,7 @@ fn a_plain_iceoryx2_process_never_notices_a_robot_that_is_killed_and_swept() {
                 remove_stale_nodes(&domain.config).unwrap() == 1
             });
         }
-        // It goes on after each sweep.
+        // The stranger goes on after each sweep.
         let before = counted;
         until("the stranger counts on", || {
             assert!(
@@ -117,7 +118,7 @@ fn a_plain_iceoryx2_process_never_notices_a_robot_that_is_killed_and_swept() {
     assert!(stranger.end().success());
 }
 
-/// Where the transport keeps what the process says of itself.
+/// The file in which the transport keeps a process's details.
 fn details_of(domain: &Domain, pid: u32) -> PathBuf {
     let is_its = |path: &PathBuf| {
         let text = fs::read(path).unwrap_or_default();
@@ -145,7 +146,7 @@ fn a_dead_node_whose_details_cannot_be_read_keeps_what_it_has() {
     put(b"of another version");
     let transport = || {
         let mut files = domain.left_in_folder();
-        files.retain(|file| file.starts_with(domain.place().transport_folder()));
+        files.retain(|file| file.starts_with(domain.home().transport_folder()));
         (files, domain.in_shared_memory())
     };
     let before = transport();
@@ -167,7 +168,7 @@ fn a_dead_node_that_was_writing_its_details_is_swept() {
     assert!(!details.exists());
 }
 
-/// How many nodes come while another process sweeps.
+/// How many nodes start while another process sweeps.
 const NEWCOMERS: usize = 2_000;
 
 #[test]

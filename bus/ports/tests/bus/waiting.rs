@@ -4,8 +4,10 @@ use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Cause, Policy, PortError, Shutdown, Waiter, Wake};
-use lager_topics::{OperatorInput, Role, SensorDistance, SensorLine, SteeringCommand};
+use lager_ports::{Cause, PortError};
+use lager_sample::{Qos, Topic};
+use lager_topics::{OperatorInput, Order, Role, SensorDistance, SensorLine, SteeringCommand};
+use lager_wake::{Policy, Shutdown, Waiter, Wake};
 
 use crate::domain::{Domain, drain, send, until};
 
@@ -43,7 +45,7 @@ fn a_sleeping_actor_is_woken_from_another_thread() {
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 let publisher = bridge.publisher::<SensorLine>().unwrap();
-                // So that the actor sleeps by now; if not, the test is only easier.
+                // Gives the actor time to fall asleep. If it does not, the test is only easier.
                 std::thread::sleep(Duration::from_millis(30));
                 send(&publisher, 5);
                 read.wait();
@@ -78,7 +80,7 @@ fn a_quiet_adaptive_waiter_sleeps_for_every_ring() {
     let domain = Domain::new();
     let logic = domain.open(Role::Logic);
     let waiter = logic.waiter(Policy::ADAPTIVE).unwrap();
-    let ringer = waiter.ringer().unwrap();
+    let ringer = waiter.ringer();
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -93,14 +95,14 @@ fn a_quiet_adaptive_waiter_sleeps_for_every_ring() {
             let before = waiter.sleeps();
             assert_eq!(waiter.wait(LONG), Wake::Rung);
             let sleeps = waiter.sleeps() - before;
-            // A machine with other things to do may ring before the wait, which then needs no
-            // sleep. No ring is slept for twice.
+            // On a busy machine the ring may come before the wait, which then needs no sleep. But
+            // no ring takes two sleeps.
             assert!(sleeps <= 1, "{sleeps} sleeps for one ring");
             slept += sleeps;
             slept == 40
         });
     });
-    // And without any ring it sleeps its whole time-out at once.
+    // Without any ring it sleeps through its whole time-out at once.
     waiter.wait(Duration::ZERO);
     let before = waiter.sleeps();
     assert_eq!(waiter.wait(Duration::from_millis(5)), Wake::TimedOut);
@@ -113,16 +115,16 @@ fn an_adaptive_waiter_does_not_sleep_under_quick_rings() {
     let domain = Domain::new();
     let logic = domain.open(Role::Logic);
     let waiter = logic.waiter(Policy::ADAPTIVE).unwrap();
-    // On one core nobody may spin, since the ringer needs it.
+    // On one core no waiter may spin, because the ringer needs the core.
     spins_under_quick_rings(&waiter);
 }
 
-/// Rings at 10 kHz until the waiter has waited for three in a row without a sleep. On a busy
-/// machine neither thread keeps its core for long and sleeping is right, so it is tried many times.
+/// Rings at 10 kHz until the waiter has noticed three rings in a row without a sleep. On a busy
+/// machine threads lose their cores and sleeping is right, so this tries many times.
 pub(crate) fn spins_under_quick_rings(waiter: &Waiter) {
     const DISTANCE: Duration = Duration::from_micros(100);
     let waited_awake = || {
-        let ringer = waiter.ringer().unwrap();
+        let ringer = waiter.ringer();
         let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| {
@@ -139,7 +141,7 @@ pub(crate) fn spins_under_quick_rings(waiter: &Waiter) {
             for _ in 0..40 {
                 let (before, start) = (waiter.sleeps(), Instant::now());
                 assert_eq!(waiter.wait(LONG), Wake::Rung);
-                // A ring that was there already has not been waited for.
+                // If the ring was there already, this was no wait.
                 let waited = start.elapsed() > DISTANCE / 2;
                 awake = if waited && waiter.sleeps() == before {
                     awake + 1
@@ -156,7 +158,7 @@ pub(crate) fn spins_under_quick_rings(waiter: &Waiter) {
     until("it looks instead of sleeping", waited_awake);
 }
 
-/// Ends the other thread also when this one fails.
+/// Ends the other thread even if this one fails.
 struct StopsAtTheEnd<'a>(&'a AtomicBool);
 
 impl Drop for StopsAtTheEnd<'_> {
@@ -198,6 +200,15 @@ fn one_waiter_serves_all_topics_of_its_role() {
     assert_eq!(waiter.wait(LONG), Wake::Rung);
 }
 
+struct Gong;
+
+impl Topic for Gong {
+    const NAME: &'static str = "test/gong";
+    type Payload = Order;
+    const QOS: Qos = Qos::stream(4).waking(&[Role::Logic.part(), Role::Bridge.part()]);
+    const SUMMARY: &'static str = "What two actors hear.";
+}
+
 #[test]
 fn a_sample_rings_every_actor_of_its_topic_and_nobody_else() {
     let domain = Domain::new();
@@ -207,8 +218,8 @@ fn a_sample_rings_every_actor_of_its_topic_and_nobody_else() {
     let bridge_waiter = bridge.waiter(Policy::Block).unwrap();
     let comm = domain.open(Role::Comm);
 
-    let input = comm.publisher::<OperatorInput>().unwrap();
-    input.send(Cause::OWN, Default::default()).unwrap();
+    let gong = comm.publisher::<Gong>().unwrap();
+    gong.send(Cause::OWN, Default::default()).unwrap();
     assert_eq!(logic_waiter.wait(LONG), Wake::Rung);
     assert_eq!(bridge_waiter.wait(LONG), Wake::Rung);
 
@@ -225,7 +236,7 @@ fn an_actor_that_starts_after_the_writer_is_rung_too() {
     let publisher = bridge.publisher::<SensorLine>().unwrap();
     send(&publisher, 0);
     for _ in 0..3 {
-        // Comes, is rung, goes; and comes again.
+        // The waiter comes, is rung and goes, and then comes again.
         let logic = domain.open(Role::Logic);
         let waiter = logic.waiter(Policy::Block).unwrap();
         send(&publisher, 1);
@@ -256,7 +267,7 @@ fn a_ringer_wakes_from_any_thread() {
     let domain = Domain::new();
     let bridge = domain.open(Role::Bridge);
     let waiter = bridge.waiter(Policy::Block).unwrap();
-    let ringer = waiter.ringer().unwrap();
+    let ringer = waiter.ringer();
     for _ in 0..10 {
         let ringer = ringer.clone();
         let thread = std::thread::spawn(move || ringer.ring());
@@ -271,7 +282,7 @@ fn a_wish_to_stop_wakes_whoever_waits() {
     let bridge = domain.open(Role::Bridge);
     let waiter = bridge.waiter(Policy::Block).unwrap();
     let shutdown = Shutdown::new();
-    shutdown.wake(waiter.ringer().unwrap());
+    shutdown.wake(waiter.ringer());
     assert!(!shutdown.is_requested());
     let thread = std::thread::spawn({
         let shutdown = shutdown.clone();
@@ -281,8 +292,8 @@ fn a_wish_to_stop_wakes_whoever_waits() {
     until("the wish is seen", || shutdown.is_requested());
     thread.join().unwrap();
 
-    // Who begins to wait after the wish is woken as well.
-    shutdown.wake(waiter.ringer().unwrap());
+    // A waiter that begins to wait after the request is woken as well.
+    shutdown.wake(waiter.ringer());
     assert_eq!(waiter.wait(LONG), Wake::Rung);
 }
 
@@ -294,7 +305,7 @@ fn observers_have_no_waiter() {
     assert_eq!(
         error,
         PortError::NotAnActor {
-            role: Role::Observer
+            part: Role::Observer.part()
         }
     );
     assert!(error.to_string().contains("observers poll"));

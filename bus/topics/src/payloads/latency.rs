@@ -1,12 +1,12 @@
 //! How long the robot takes to react: `latency/path` and `latency/command`.
 //!
-//! Logic publishes the way of each sensor frame to its decision, the bridge the way of each order
-//! that rests on a frame to the wire: each writes what it sees, on a topic of its own. All counts
-//! begin when their writer is started and never go down before it ends, so a reader that was away
-//! has missed nothing, and the difference of two samples is the time between them
+//! Logic publishes how long each sensor frame takes to its decision. The bridge publishes how long
+//! each order that follows from a frame takes to the wire. Each writes what it sees, on its own
+//! topic. All counts begin when their writer starts and never go down before it ends. So a reader
+//! that was away has missed nothing, and the difference of two samples covers the time between them
 //! ([`Durations::since`]).
 
-use crate::schema::payload;
+use lager_sample::payload;
 
 /// How many buckets [`Durations`] has.
 const BUCKETS: usize = 90;
@@ -40,25 +40,25 @@ payload! {
     ///  89          above 2^30, about 1.07 s
     /// ```
     ///
-    /// For `i` from 1 to 88 the upper end is `(5 + (i - 1) % 4) << (6 + (i - 1) / 4)`, and belongs
-    /// to the bucket ([`Durations::upper_ns`]). Every fourth upper end, from bucket 0 on, is a
-    /// power of two, so four buckets can be added up to one. JSON leaves out the empty buckets at
-    /// the end.
+    /// For `i` from 1 to 88 the upper end is `(5 + (i - 1) % 4) << (6 + (i - 1) / 4)`. A duration
+    /// equal to it counts in the bucket ([`Durations::upper_ns`]). Every fourth upper end, from
+    /// bucket 0 on, is a power of two, so four buckets can be added up to one. JSON leaves out the
+    /// empty buckets at the end.
     pub struct Durations: 744 bytes {
-        /// Durations counted: the sum of all buckets.
+        /// How many durations were counted: the sum of all buckets.
         pub count: u64,
         /// Their sum.
         pub sum_ns: u64,
         /// The longest.
         pub max_ns: u64,
         /// How many fell into each bucket.
-        #[serde(with = "crate::list")]
+        #[serde(with = "lager_sample::list")]
         pub buckets: [u64; 90],
     }
 }
 
 payload! {
-    /// The way of each sensor frame, `sensor/line` and `sensor/distance`, to logic's decision,
+    /// How long each sensor frame, `sensor/line` and `sensor/distance`, takes to logic's decision,
     /// whether the decision changes anything or not.
     ///
     /// ```text
@@ -68,22 +68,22 @@ payload! {
     ///   |<-------------- total --------------->|
     /// ```
     ///
-    /// Only frames that were lost on the bus, or that came while logic was away, do not count.
+    /// Frames that were lost on the bus, or that came while logic was away, do not count.
     pub struct PathLatency: 2976 bytes {
         /// From the `read` of the frame's last bytes to its publication.
         pub read_publish: Durations,
-        /// From there until logic has received it: logic's wake-up.
+        /// From that publication until logic has received the frame: logic's wake-up.
         pub publish_receive: Durations,
-        /// From there until the turn in which logic received it is over: it has decided on this
-        /// frame and all others that were there, and has sent the orders that follow.
+        /// From that moment until logic ends the turn in which it received the frame: it has
+        /// decided on all frames that were there, and has sent the orders that follow.
         pub decide: Durations,
-        /// All of it.
+        /// The three together: from the `read` until logic has decided.
         pub total: Durations,
     }
 }
 
 payload! {
-    /// The way of logic's orders to the steering board's wire.
+    /// How long logic's orders take to the steering board's wire.
     ///
     /// ```text
     ///  bridge's reader          logic                bridge's main loop
@@ -92,18 +92,17 @@ payload! {
     ///   |<------------------------------- total -------------------------------->|
     /// ```
     ///
-    /// A renewal carries the times of the newest frame that logic had decided upon. It counts as an
-    /// order that was received; it causes no write, since the bridge repeats the command in force
-    /// by itself.
+    /// A renewal carries the times of the newest frame on which logic had decided. It counts as a
+    /// received order. It causes no write: the bridge repeats the command in force by itself.
     pub struct CommandLatency: 2232 bytes {
-        /// From the publication of an order that rests on a sensor frame until the bridge has
+        /// From the publication of an order that follows from a sensor frame until the bridge has
         /// received it: its main loop's wake-up. Renewals and refused orders count too.
         pub order_receive: Durations,
-        /// From there until the command is written. Counted is the first write of an order that a
-        /// sensor frame has caused and that the arbiter put in force and wrote at once; not those
-        /// that were refused, replaced or held back.
+        /// From that moment until the command is written. This counts the first write of an order
+        /// that a sensor frame has caused, if the arbiter put the order in force and wrote it at
+        /// once. Orders that were refused, replaced or held back do not count.
         pub receive_write: Durations,
-        /// Of the same orders: from the `read` of the frame's last bytes until the command is
+        /// For the same orders: from the `read` of the frame's last bytes until the command is
         /// written.
         pub total: Durations,
     }
@@ -146,11 +145,11 @@ impl Durations {
         self.buckets[Self::bucket(duration_ns)] += 1;
     }
 
-    /// What was counted after `earlier`, a sample of the same writer; all of it if the writer was
-    /// started anew in between.
+    /// The durations counted after `earlier`, a sample of the same writer; all of them if the
+    /// writer was restarted in between.
     ///
-    /// The longest of the difference is not known exactly: `max_ns` is the upper end of its bucket,
-    /// or the longest of all if that is shorter.
+    /// The longest of these is not known exactly: `max_ns` is the upper end of its bucket, or the
+    /// longest of all durations if that is shorter.
     pub fn since(&self, earlier: &Self) -> Self {
         let mut after = *self;
         let mut highest = None;
@@ -172,10 +171,10 @@ impl Durations {
         after
     }
 
-    /// The duration that this part of all did not exceed, in ns, between 0 and 1: 0.5 is the
-    /// median. 0 if nothing was counted.
+    /// The duration in ns that the share `part` of all durations did not exceed. `part` is 0 to 1:
+    /// 0.5 gives the median. 0 if nothing was counted.
     ///
-    /// It is interpolated within its bucket, which ends at most a quarter above its beginning.
+    /// It is interpolated within its bucket, which ends at most a quarter above its lower end.
     pub fn quantile_ns(&self, part: f64) -> u64 {
         let counted = self.buckets.iter().sum::<u64>();
         let rank = ((part * counted as f64).ceil() as u64).clamp(1, counted.max(1));

@@ -1,37 +1,40 @@
-//! What the services are doing: `log/thought` (G9). A thought travels as a kind with its values.
-//! [`Thought`]'s `Display` makes a sentence of it where a person reads it.
+//! [`Thought`]: what the services are doing, on `log/thought` (G9). A thought travels as a kind
+//! with values. Its `Display` makes a sentence of it where a person reads it.
 //!
-//! This file has everything about a kind: its code, what its values mean, and its sentence. A
-//! failure is a [`Failure`] and has its own file.
+//! This file has the kinds: their codes, and the meaning of their values. Their sentences are in
+//! the table of `lager-orders`. A failure is a [`Failure`] and has its own file.
+
+use lager_floor::Heading;
 
 use core::fmt;
 
+use lager_orders::{Language, Reason, Sentence};
+
 use super::failure::Failure;
-use super::nav::Heading;
+use super::said;
 use crate::role::Role;
-use crate::schema::payload;
-use crate::tag::{Tag, coded};
+use lager_sample::{Tag, coded, payload};
 
 coded! {
-    /// What is thought. The names in brackets are the fields of [`Thought`] it fills.
+    /// The kind of a thought. In brackets: the fields of [`Thought`] that it fills.
     pub enum ThoughtKind {
         /// Nothing.
         None = 0,
         /// A map has come.
         MapTaken = 1,
-        /// A map cannot be driven in (`failure`).
+        /// The robot cannot drive on a map (`failure`).
         MapRefused = 2,
-        /// A map cannot be taken during a mission.
+        /// A map came during a mission and was not taken.
         MapKept = 3,
-        /// Another map has taken the first one's place.
+        /// Another map has replaced the first one.
         MapChanged = 4,
-        /// A person has put the robot on a node that there is not (`x`, `y`).
+        /// A person has put the robot on a node that does not exist (`x`, `y`).
         NoSuchNode = 5,
-        /// A person has put the robot on its start.
+        /// A person has put the robot on its starting place.
         PutAtStart = 6,
         /// A person has put the robot on a node (`x`, `y`).
         PutDown = 7,
-        /// Nobody puts a robot down that moves.
+        /// A person has put the robot down while it moves by itself, which is not believed.
         MovesAlone = 8,
         /// A way is blocked (`x`, `y`, `heading`).
         WayBlocked = 9,
@@ -49,47 +52,47 @@ coded! {
         Picking = 15,
         /// The robot stands at the goods and waits for the operator (`product`).
         AwaitsPickup = 16,
-        /// The operator is not believed (`product`, `failure`).
+        /// The operator says that the goods are held and is not believed (`product`, `failure`).
         PickupRefused = 17,
         /// The goods are held (`product`).
         HasGoods = 18,
         /// The goods are delivered (`product`).
         Delivered = 19,
-        /// No reports of the steering board come.
+        /// The steering board sends no reports.
         BoardUnheard = 20,
-        /// They come again.
+        /// The steering board sends reports again.
         BoardHeard = 21,
-        /// No line frames come.
+        /// The sensor board sends no line frames.
         Blind = 22,
-        /// They come again.
+        /// The sensor board sends line frames again.
         SeesAgain = 23,
         /// The battery has `seen` tenths of a volt, which is little.
         BatteryLow = 24,
         /// The battery has `seen` tenths of a volt, which is enough.
         BatteryCharged = 25,
-        /// It stands at a node because of the battery (`x`, `y`).
+        /// The robot stands at a node because of the battery (`x`, `y`).
         Parked = 26,
         /// A joint of the arm has not been heard (`joint`).
         JointUnheard = 27,
-        /// A joint stands at `seen` instead of `expected` (`joint`).
+        /// A joint stands at `seen` instead of at `expected` (`joint`).
         JointOff = 28,
-        /// The arm is where it is carried.
+        /// The arm is in its carrying position.
         ArmCarried = 29,
         /// A node is passed (`x`, `y`); `seen` crossings to go.
         NodePassed = 30,
-        /// It turns to the left at a node (`x`, `y`).
+        /// The robot turns to the left at a node (`x`, `y`).
         TurnsLeft = 31,
-        /// It turns to the right at a node (`x`, `y`).
+        /// The robot turns to the right at a node (`x`, `y`).
         TurnsRight = 32,
-        /// It looks for the station of the goods (`product`).
+        /// The robot looks for the station of the goods (`product`).
         SeeksStation = 33,
-        /// It leaves the warehouse with the goods.
+        /// The robot leaves the warehouse with the goods.
         LeavesToDeliver = 34,
-        /// It is back and waits.
+        /// The robot is back and waits.
         IsBack = 35,
-        /// It stands before the cross bar.
+        /// The robot stands before the cross bar.
         AtBar = 36,
-        /// The mark of the station is there.
+        /// The robot sees the mark of the station.
         StationSeen = 37,
         /// The mark of the station did not come.
         StationMissed = 38,
@@ -99,46 +102,48 @@ coded! {
         MarkOnWayOut = 40,
         /// A crossing on the way out.
         CrossingOnWayOut = 41,
-        /// A turn was disturbed; it is believed to look along `heading`.
+        /// A turn was disturbed; the robot probably looks along `heading`.
         TurnDisturbed = 42,
-        /// A mark shows that it looks elsewhere (`x`, `y`, `heading`).
+        /// A mark shows that the robot looks another way (`x`, `y`, `heading`).
         PlaceCorrected = 43,
-        /// It cannot go on (`failure`).
+        /// The robot cannot go on (`failure`).
         Failed = 44,
         /// Something stands `seen` cm ahead, between two nodes.
         Halts = 45,
-        /// It tries the ways again that it had found blocked.
+        /// The robot tries the ways again that it had found blocked.
         TriesAgain = 46,
         /// The order cannot be carried out now and waits (`product`).
         OrderPutOff = 47,
-        /// An order is taken back (`product`).
+        /// An order is cancelled (`product`).
         OrderCancelled = 48,
         /// A waiting order is carried out earlier (`product`).
         OrderMovedUp = 49,
-        /// All waiting orders are taken back.
+        /// All waiting orders are cancelled.
         QueueCleared = 50,
-        /// The turn to the station has passed its mark.
+        /// The robot has turned past the mark of the station.
         StationPassed = 51,
         /// The external computer is out of reach; the robot stands at the next node.
         LinkLost = 52,
-        /// It is there again.
+        /// The external computer is in reach again.
         LinkBack = 53,
-        /// It stands at the node (`x`, `y`) until the external computer is there again.
+        /// The robot stands at the node (`x`, `y`) until the external computer is in reach again.
         ParkedWithoutLink = 54,
         /// The delivery corner's mark has not come on the way back.
         CornerMissed = 55,
         /// A person picks the goods up from now on.
         PicksByHand = 56,
-        /// It picks the goods up by itself from now on.
+        /// The robot picks the goods up by itself from now on.
         PicksByItself = 57,
-        /// The order is taken back too late: its goods are held, or being gripped (`product`).
+        /// An order is cancelled too late: its goods are held, or being gripped (`product`).
         OrderKept = 58,
         /// The goods are in their place again (`product`).
         GoodsBack = 59,
         /// All goods are in their places again.
         AllGoodsBack = 60,
-        /// The goods are not in their place, as it was told (`product`).
+        /// A person has said that the goods are not in their place (`product`).
         GoodsGone = 61,
+        /// The robot sounds its horn.
+        Honks = 62,
     }
 }
 
@@ -157,32 +162,32 @@ coded! {
 }
 
 payload! {
-    /// One thought; its kind says which of the values mean something.
+    /// One thought. Its kind says which of the values have a meaning.
     pub struct Thought: 32 bytes {
-        /// What.
+        /// The kind.
         pub kind: Tag<ThoughtKind>,
-        /// Who thinks it.
+        /// The service that thinks it.
         pub from: Tag<Role>,
-        /// Column of the node it is about.
+        /// Column of the node that it is about.
         pub x: u8,
-        /// Row of the node it is about.
+        /// Row of the node that it is about.
         pub y: u8,
-        /// The direction it is about.
+        /// The direction that it is about.
         pub heading: Tag<Heading>,
-        /// The joint it is about.
+        /// The joint that it is about.
         pub joint: Tag<Joint>,
         /// Sides of a mark: bit 0 = left, bit 1 = right.
         pub sides: u8,
         /// Always 0.
         #[serde(skip)]
         pub reserved: u8,
-        /// The product it is about.
+        /// The product that it is about.
         pub product: i32,
         /// What was expected.
         pub expected: i32,
         /// What was seen.
         pub seen: i32,
-        /// What is wrong.
+        /// What has gone wrong.
         pub failure: Failure,
     }
 }
@@ -197,210 +202,33 @@ impl From<ThoughtKind> for Thought {
 }
 
 impl fmt::Display for Thought {
+    /// The English sentence.
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             x,
             y,
-            heading,
-            product,
             expected,
             seen,
-            failure,
             ..
         } = self;
-        let Some(kind) = self.kind.get() else {
+        let name = match self.kind.get() {
+            Some(ThoughtKind::OrderWaits) if *seen == 0 => "thought_order_waits_next".into(),
+            _ => said::name("thought", self.kind),
+        };
+        let Some(sentence) = Sentence::of(&name) else {
             return write!(to, "I think something unknown.");
         };
-        match kind {
-            ThoughtKind::None => write!(to, "Nothing."),
-            ThoughtKind::MapTaken => write!(to, "I have a map. Which product shall I fetch?"),
-            ThoughtKind::MapRefused => write!(to, "I cannot use this map: {failure}."),
-            ThoughtKind::MapKept => {
-                write!(to, "I keep my map until I am back; send the new one then.")
-            }
-            ThoughtKind::MapChanged => write!(to, "The map has changed."),
-            ThoughtKind::NoSuchNode => write!(
-                to,
-                "There is no crossing ({x}, {y}) on my map; I stay where I was."
-            ),
-            ThoughtKind::PutAtStart => write!(
-                to,
-                "Reset: I stand at the start. Which product shall I fetch?"
-            ),
-            ThoughtKind::PutDown => write!(
-                to,
-                "I have been put on crossing ({x}, {y}). Which product shall I fetch?"
-            ),
-            ThoughtKind::MovesAlone => write!(
-                to,
-                "I am moving, so nobody has put me down. Stop me, or take the manual mode, and \
-                 tell me again."
-            ),
-            ThoughtKind::WayBlocked => {
-                write!(to, "The way from ({x}, {y}) to the {heading} is blocked.")
-            }
-            ThoughtKind::WayOpen => write!(to, "The way from ({x}, {y}) to the {heading} is open."),
-            ThoughtKind::OrderWaits if *seen == 0 => {
-                write!(to, "I shall fetch product {product} next.")
-            }
-            ThoughtKind::OrderWaits => {
-                write!(
-                    to,
-                    "I shall fetch product {product}; waiting before it: {seen}."
-                )
-            }
-            ThoughtKind::OrderPutOff => write!(
-                to,
-                "There is no way to product {product} now; I fetch it later."
-            ),
-            ThoughtKind::OrderCancelled => write!(to, "I shall not fetch product {product}."),
-            ThoughtKind::OrderKept => write!(
-                to,
-                "I bring product {product} all the same: it is in my claw, or about to be."
-            ),
-            ThoughtKind::GoodsBack => write!(to, "Product {product} is in its place again."),
-            ThoughtKind::AllGoodsBack => write!(to, "All goods are in their places again."),
-            ThoughtKind::GoodsGone => write!(to, "Product {product} is not in its place."),
-            ThoughtKind::OrderMovedUp => write!(to, "I shall fetch product {product} earlier."),
-            ThoughtKind::QueueCleared => write!(to, "I shall fetch none of what was waiting."),
-            ThoughtKind::OrderWaitsForCharge => write!(
-                to,
-                "The battery is low; I fetch product {product} when it is charged."
-            ),
-            ThoughtKind::OrderRefused => write!(to, "I cannot fetch product {product}: {failure}."),
-            ThoughtKind::Fetching => {
-                write!(to, "I fetch product {product}; {seen} crossings to go.")
-            }
-            ThoughtKind::Picking => write!(to, "I stand at product {product} and pick it up."),
-            ThoughtKind::AwaitsPickup => write!(
-                to,
-                "I stand at product {product}. Pick it up with the arm and tell me when it is done."
-            ),
-            ThoughtKind::PickupRefused => write!(
-                to,
-                "I do not believe that I have product {product}: {failure}."
-            ),
-            ThoughtKind::HasGoods => {
-                write!(to, "I have product {product} and take it to delivery.")
-            }
-            ThoughtKind::Delivered => write!(to, "Product {product} is delivered. I go back."),
-            ThoughtKind::BoardUnheard => write!(
-                to,
-                "The steering board does not report; I stand until it does."
-            ),
-            ThoughtKind::BoardHeard => write!(to, "The steering board reports again; I go on."),
-            ThoughtKind::Blind => write!(to, "No line frames come; I stand until I see again."),
-            ThoughtKind::SeesAgain => write!(to, "I see again and drive on."),
-            ThoughtKind::BatteryLow => write!(
-                to,
-                "The battery is low, {}.{} V. I stand at the next crossing.",
-                seen / 10,
-                seen % 10
-            ),
-            ThoughtKind::BatteryCharged => {
-                write!(to, "The battery has {}.{} V again.", seen / 10, seen % 10)
-            }
-            ThoughtKind::Parked => write!(
-                to,
-                "I stand at crossing ({x}, {y}): the battery is low. Charge it, or put me down \
-                 anew and press reset."
-            ),
-            ThoughtKind::LinkLost => write!(
-                to,
-                "The external computer is out of reach. I stand at the next crossing."
-            ),
-            ThoughtKind::PicksByHand => {
-                write!(to, "From now on a person picks the goods up.")
-            }
-            ThoughtKind::PicksByItself => {
-                write!(to, "From now on I pick the goods up by myself.")
-            }
-            ThoughtKind::LinkBack => write!(to, "The external computer is there again."),
-            ThoughtKind::ParkedWithoutLink => write!(
-                to,
-                "I stand at crossing ({x}, {y}) until the external computer is there again."
-            ),
-            ThoughtKind::JointUnheard => write!(
-                to,
-                "I do not know where the arm's {} is; I wait with the goods until it is heard.",
-                self.joint_name()
-            ),
-            ThoughtKind::JointOff => write!(
-                to,
-                "The arm's {} is at {seen}; I wait with the goods until it is at {expected}.",
-                self.joint_name()
-            ),
-            ThoughtKind::ArmCarried => write!(to, "The arm is where it is carried; I go."),
-            ThoughtKind::NodePassed => write!(to, "Crossing ({x}, {y}), {seen} to go."),
-            ThoughtKind::TurnsLeft => write!(to, "At crossing ({x}, {y}) I turn left."),
-            ThoughtKind::TurnsRight => write!(to, "At crossing ({x}, {y}) I turn right."),
-            ThoughtKind::SeeksStation => write!(to, "I look for product {product}."),
-            ThoughtKind::LeavesToDeliver => write!(to, "I leave the warehouse to deliver."),
-            ThoughtKind::IsBack => write!(to, "I am back. Which product shall I fetch?"),
-            ThoughtKind::AtBar => write!(to, "I am at the place of delivery and let go."),
-            ThoughtKind::StationSeen => write!(to, "There is the pick station's mark."),
-            ThoughtKind::StationMissed => {
-                write!(to, "The pick station's mark did not come; I try again.")
-            }
-            ThoughtKind::StationPassed => {
-                write!(
-                    to,
-                    "I have turned past the pick station's mark; I look for it."
-                )
-            }
-            ThoughtKind::MarkUnexpected => write!(
-                to,
-                "A mark to {} after {seen} mm is not on my map; I ignore it.",
-                self.sides_name()
-            ),
-            ThoughtKind::MarkOnWayOut => write!(
-                to,
-                "A mark to {} on the way out; I ignore it.",
-                self.sides_name()
-            ),
-            ThoughtKind::CrossingOnWayOut => write!(to, "A crossing on the way out; I ignore it."),
-            ThoughtKind::TurnDisturbed => write!(
-                to,
-                "My turn was disturbed; I see by the next marks whether I look {heading}."
-            ),
-            ThoughtKind::PlaceCorrected => write!(
-                to,
-                "This mark shows that I turned too far or not far enough: I look {heading}, from \
-                 crossing ({x}, {y})."
-            ),
-            ThoughtKind::Halts => write!(to, "Something stands {seen} cm ahead of me; I stop."),
-            ThoughtKind::CornerMissed => write!(
-                to,
-                "I have not seen the mark of the delivery corner; I drive on to the next one."
-            ),
-            ThoughtKind::TriesAgain => {
-                write!(to, "I try the ways again that I have found blocked.")
-            }
-            ThoughtKind::Failed => match failure.remedy.get() {
-                Some(remedy) => write!(to, "{failure}. {remedy}"),
-                None => write!(to, "{failure}."),
-            },
-        }
-    }
-}
-
-impl Thought {
-    fn joint_name(&self) -> &'static str {
-        match self.joint.get() {
-            Some(Joint::Base) => "base",
-            Some(Joint::Shoulder) => "shoulder",
-            Some(Joint::Elbow) => "elbow",
-            Some(Joint::Wrist) => "wrist",
-            None => "joint",
-        }
-    }
-
-    fn sides_name(&self) -> &'static str {
-        match self.sides & 3 {
-            0 => "neither side",
-            1 => "the left",
-            2 => "the right",
-            _ => "both sides",
-        }
+        sentence.put(Language::English, to, &mut |key, to| match key {
+            "node" => write!(to, "({x}, {y})"),
+            "looks" => write!(to, "{}", said::reason("looks", self.heading)),
+            "joint" => write!(to, "{}", said::reason("joint", self.joint)),
+            "sides" => write!(to, "{}", Reason::read(&format!("sides_{}", self.sides & 3))),
+            "product" => write!(to, "{}", self.product),
+            "expected" => write!(to, "{expected}"),
+            "volts" => write!(to, "{}.{}", seen / 10, seen % 10),
+            "failure" => write!(to, "{}", self.failure),
+            "remedy" => write!(to, "{}", said::reason("remedy", self.failure.remedy)),
+            _ => write!(to, "{seen}"),
+        })
     }
 }

@@ -1,38 +1,44 @@
 //! The sample layouts, one file per family of topics.
 
+mod action;
 mod failure;
+mod inputs;
 mod latency;
 mod link;
 mod log;
+mod map;
 mod mission;
 mod nav;
 mod pose;
 mod request;
+mod said;
 mod sensor;
 mod steering;
 mod stop;
-mod told;
 mod truth;
 
+pub use action::{Input, InputKind};
 pub use failure::{Failure, FailureKind, Remedy};
+pub use inputs::{Beside, NavigatorInput, NavigatorInputKind, NavigatorInputs, Sent, TextKind};
 pub use latency::{CommandLatency, Durations, PathLatency};
-pub use link::{ArmProfileState, BoardHealth, CalibratedSensor, Calibration, Health, Mode};
+pub use link::{ArmProfileState, BoardHealth, CalibratedSensor, Calibration, Health};
 pub use log::{Joint, Thought, ThoughtKind};
+pub use map::{MapProduct, WarehouseMap};
 pub use mission::{
-    Event, EventKind, GoneGoods, GoneWhy, Input, InputKind, Order, OrderQueue, WaitingOrder,
+    Event, EventKind, GoneGoods, GoneWhy, NotWaiting, Order, OrderQueue, WaitingOrder,
 };
 pub use nav::{
-    BlockSource, BlockedWay, BlockedWays, Goal, Heading, Hold, MapProduct, NavigatorStatus, Phase,
-    Pick, Route, RouteNode, Side, Step, WarehouseMap,
+    BlockSource, BlockedWay, BlockedWays, Goal, Hold, NavigatorStatus, Phase, Route, RouteNode,
+    Step,
 };
 pub use pose::Pose;
 pub use request::{
-    Answer, Ask, AskKind, Outcome, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,
+    Ask, AskKind, BridgeAnswer, Outcome, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,
 };
+pub use said::word;
 pub use sensor::{DistanceFrame, LineFrame};
 pub use steering::{Finish, Origin, Refusal, SteeringOrder, SteeringReport};
 pub use stop::StopCause;
-pub use told::{Sent, TextKind, Told, ToldInputs, ToldKind};
 pub use truth::{GoodState, Truth, TruthGood, TruthObstacle};
 
 /// Position of a servo that has not been heard yet; real ones are 0..=1023 (AX-12).

@@ -1,22 +1,25 @@
-//! Where the robot is between nodes, from what logic tells: the node last passed, the way since
-//! then and where it looks.
+//! [`Pose`]: where the robot is between nodes, from logic's status: the node last passed, the way
+//! since then and where the robot looks.
 
-use super::nav::{Heading, MapProduct, NavigatorStatus, Phase, Side, WarehouseMap};
+use lager_floor::{Heading, Node};
 
-/// A place in the warehouse.
+use super::map::{MapProduct, WarehouseMap};
+use super::nav::{NavigatorStatus, Phase};
+
+/// A place and a heading in the warehouse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pose {
     /// Middle of the axle in mm, x to the right of node (0, 0).
     pub x_mm: i32,
     /// Middle of the axle in mm, y up from node (0, 0).
     pub y_mm: i32,
-    /// Where it looks, in degrees clockwise from up; any number of turns.
+    /// Where the robot looks, in degrees clockwise from up; may be several turns.
     pub heading_deg: i32,
 }
 
 impl NavigatorStatus {
-    /// Where the middle of the axle is, if what the robot does is known. `map` is the warehouse
-    /// that it drives in.
+    /// Where the middle of the axle is, if the robot's phase tells it. `map` is the robot's
+    /// warehouse.
     pub fn pose(&self, map: &WarehouseMap) -> Option<Pose> {
         pose(self, map)
     }
@@ -28,29 +31,29 @@ fn pose(status: &NavigatorStatus, map: &WarehouseMap) -> Option<Pose> {
     let (along, way_mm) = match phase {
         // On the way back logic counts from the cross bar.
         Phase::Returning => (outwards(map), status.exit_mm - status.travelled_mm),
-        // Half round it looks along no way.
+        // While it turns round, it looks along no way.
         Phase::TurningRound => (outwards(map), status.travelled_mm),
-        // The robot has turned, or turns, off the edge that it came along.
+        // The robot has turned off the edge along which it came, or is turning.
         Phase::Positioning | Phase::Picking | Phase::Leaving => {
             let along = goods(status, map).and_then(|goods| edge_from(status, goods));
             (along.unwrap_or(looks), status.travelled_mm)
         }
         _ => (looks, status.travelled_mm),
     };
-    let (right, up) = step(along);
+    let (right, up) = along.step();
     let turned_deg = match phase {
         Phase::Turning
         | Phase::Positioning
         | Phase::Leaving
         | Phase::TurningRound
         | Phase::TurningBack => status.turned_deg,
-        // The tape tells where it looks.
+        // The tape shows where it looks.
         _ => 0,
     };
     Some(Pose {
         x_mm: i32::from(status.x) * side_mm + right * way_mm,
         y_mm: i32::from(status.y) * side_mm + up * way_mm,
-        heading_deg: degrees(looks) + i32::from(turned_deg),
+        heading_deg: looks.degrees() + i32::from(turned_deg),
     })
 }
 
@@ -59,57 +62,17 @@ fn goods<'map>(status: &NavigatorStatus, map: &'map WarehouseMap) -> Option<&'ma
     products.find(|product| product.id == status.product)
 }
 
-/// Which way the edge of `goods` leads from the node last passed.
+/// The direction of the edge of `goods` from the node last passed.
 fn edge_from(status: &NavigatorStatus, goods: &MapProduct) -> Option<Heading> {
-    let (x, y) = (i16::from(goods.x), i16::from(goods.y));
-    let (first, second, forth) = match goods.side.get()? {
-        Side::Left => ((x, y), (x, y + 1), Heading::Up),
-        Side::Right => ((x + 1, y), (x + 1, y + 1), Heading::Up),
-        Side::Up => ((x, y + 1), (x + 1, y + 1), Heading::Right),
-        Side::Down => ((x, y), (x + 1, y), Heading::Right),
-    };
-    let at = (status.x, status.y);
-    if at == first {
-        Some(forth)
-    } else {
-        (at == second).then(|| opposite(forth))
-    }
+    let (x, y) = (status.x.try_into().ok()?, status.y.try_into().ok()?);
+    goods.get()?.edge().heading_from(Node::new(x, y))
 }
 
-/// Right and up, each by how many.
-const fn step(heading: Heading) -> (i32, i32) {
-    match heading {
-        Heading::Left => (-1, 0),
-        Heading::Up => (0, 1),
-        Heading::Right => (1, 0),
-        Heading::Down => (0, -1),
-    }
-}
-
-const fn opposite(heading: Heading) -> Heading {
-    match heading {
-        Heading::Left => Heading::Right,
-        Heading::Up => Heading::Down,
-        Heading::Right => Heading::Left,
-        Heading::Down => Heading::Up,
-    }
-}
-
-/// Which way the way out leads from the delivery corner.
+/// The direction of the way out from the delivery corner.
 fn outwards(map: &WarehouseMap) -> Heading {
     match map.delivery_x {
         0 => Heading::Left,
         _ => Heading::Right,
-    }
-}
-
-/// Clockwise from up.
-const fn degrees(heading: Heading) -> i32 {
-    match heading {
-        Heading::Up => 0,
-        Heading::Right => 90,
-        Heading::Down => 180,
-        Heading::Left => 270,
     }
 }
 
@@ -129,7 +92,7 @@ mod tests {
             id: 7,
             x: 1,
             y: 0,
-            side: Side::Down.into(),
+            side: Heading::Down.into(),
             ..MapProduct::default()
         };
         map

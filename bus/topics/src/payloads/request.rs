@@ -1,14 +1,16 @@
-//! What the bridge can be asked for: `bridge/request`.
+//! [`Ask`] and [`WorldAsk`]: requests to the bridge and to the simulated world, and their answers.
+
+use lager_floor::Heading;
 
 use core::fmt;
 
-use super::link::Mode;
-use super::nav::Heading;
-use crate::schema::payload;
-use crate::tag::{Tag, coded};
+use lager_orders::{Mode, Reason};
+use lager_sample::{Tag, coded, payload};
+
+use super::said;
 
 coded! {
-    /// What is asked.
+    /// What the client asks for.
     pub enum AskKind {
         /// Change the mode to `mode`.
         SetMode = 0,
@@ -18,62 +20,49 @@ coded! {
         SetGains = 2,
         /// Calibrate the line sensors on the tape under the robot.
         Calibrate = 3,
-        /// Restart both boards.
-        ResetBoards = 4,
-        /// Let logic drive from the start: done, without effect, if somebody has set the mode since
-        /// the robot was switched on.
-        Begin = 5,
+        /// Let logic drive from the start. Answered `Done`, but without effect, if somebody has set
+        /// the mode since the robot was switched on.
+        Begin = 4,
     }
 }
 
 coded! {
-    /// What became of it.
+    /// The result of a request.
     pub enum Outcome {
-        /// It is in force.
+        /// The change is in force.
         Done = 0,
-        /// It is not allowed now or out of range.
+        /// The request is not allowed now, or a value is out of range.
         Refused = 1,
-        /// No board that could do it is connected.
+        /// No connected board can do it.
         NoBoard = 2,
-        /// It came when its time was over; nothing was done.
+        /// The bridge read it too late and did nothing.
         Late = 3,
-        /// Not while the robot drives by itself.
+        /// Not possible while the robot drives by itself.
         UnderWay = 4,
     }
 }
 
+impl From<Outcome> for Reason {
+    fn from(outcome: Outcome) -> Self {
+        said::reason("outcome", Tag::from(outcome))
+    }
+}
+
 impl fmt::Display for Outcome {
-    /// As a sentence.
+    /// Writes a sentence.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::Done => "it is done",
-            Self::Refused => {
-                "it is refused: the value is out of range, or the board is an original one without \
-                 settings"
-            }
-            Self::NoBoard => {
-                "the board that would have to do it is not connected; `lager topic echo \
-                 link/health` shows the links"
-            }
-            Self::UnderWay => {
-                "the robot is on its way by itself; stop it or drive it by hand before that"
-            }
-            Self::Late => {
-                "it was found when its time was over, since somebody was held up; nothing was \
-                 changed, try again"
-            }
-        })
+        Reason::from(*self).fmt(formatter)
     }
 }
 
 payload! {
     /// A request to the bridge.
     pub struct Ask: 24 bytes {
-        /// When it was asked, in ns of `CLOCK_MONOTONIC`.
+        /// When the client asked, in ns of `CLOCK_MONOTONIC`.
         pub issued_ns: u64,
-        /// For how long it may be answered, in ms: as long as its asker waits.
+        /// How long after that it may be answered, in ms: as long as the client waits.
         pub lifetime_ms: u32,
-        /// What is asked.
+        /// What the client asks for.
         pub kind: Tag<AskKind>,
         /// The mode to set.
         pub mode: Tag<Mode>,
@@ -81,13 +70,13 @@ payload! {
         pub gain_p: u8,
         /// Gain on the change of the error, in the firmware's unit.
         pub gain_d: u8,
-        /// The stop to release, by its word; 0 = none is known. No other one is released.
+        /// The word of the stop to release; 0 = unknown. The bridge releases no other stop.
         pub stop_word: u64,
     }
 }
 
 impl Ask {
-    /// Whether its time is over at `now_ns`: its asker has given up, or never said when he asked.
+    /// Whether its time is over at `now_ns`: its client has given up, or did not say when it asked.
     pub fn is_over(&self, now_ns: u64) -> bool {
         is_over(self.issued_ns, self.lifetime_ms, now_ns)
     }
@@ -95,87 +84,84 @@ impl Ask {
 
 fn is_over(issued_ns: u64, lifetime_ms: u32, now_ns: u64) -> bool {
     let lifetime_ns = u64::from(lifetime_ms) * 1_000_000;
-    // What was asked in the future was not asked by this machine's clock.
+    // A request from the future was not dated by this machine's clock.
     issued_ns.abs_diff(now_ns) >= lifetime_ns
 }
 
 coded! {
-    /// What is done to the simulated world.
+    /// What a person's hands do in the simulated world.
     pub enum WorldAskKind {
-        /// The robot is taken up and put on a node, at rest.
+        /// Take the robot up and put it on a node, at rest.
         Place = 0,
-        /// A thing is put on the edge that leaves the node towards `heading`.
+        /// Put a thing on the edge that leaves the node towards `heading`.
         Put = 1,
-        /// The thing on that edge is taken away.
+        /// Take the thing on that edge away.
         Take = 2,
     }
 }
 
 coded! {
-    /// Why hands leave the simulated world as it is.
+    /// Why the simulated world did not carry a request out.
     pub enum WorldRefusal {
-        /// They do not: it was done.
+        /// The request was carried out.
         None = 0,
         /// The warehouse has no such node or edge.
         NoPlace = 1,
         /// The robot is where a thing was to be put.
         RobotThere = 2,
-        /// Nothing stands where a thing was to be taken from.
+        /// Nothing stands there to be taken away.
         NothingThere = 3,
-        /// As many things stand as there is room for.
+        /// There is no room for another thing.
         Full = 4,
         /// The ways are too short for a robot to turn beside a thing.
         NoRoom = 5,
     }
 }
 
+impl From<WorldRefusal> for Reason {
+    fn from(refusal: WorldRefusal) -> Self {
+        said::reason("world", Tag::from(refusal))
+    }
+}
+
 impl fmt::Display for WorldRefusal {
-    /// As a sentence.
+    /// Writes a sentence.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::None => "nothing is refused",
-            Self::NoPlace => "the warehouse has no such crossing or way",
-            Self::RobotThere => {
-                "the robot is there; wait until it has gone on, or `lager stop` it elsewhere"
-            }
-            Self::NothingThere => "nothing stands there; `lager obstacle` lists what stands",
-            Self::Full => "no more things fit into the warehouse; `lager obstacle take` one first",
-            Self::NoRoom => "the ways are so short that the robot could not turn beside a thing",
-        })
+        Reason::from(*self).fmt(formatter)
     }
 }
 
 payload! {
-    /// A request to whoever simulates the world: what a person would do with his hands.
+    /// A request to the simulator or the emulator: what a person would do by hand.
     pub struct WorldAsk: 16 bytes {
-        /// When it was asked, in ns of `CLOCK_MONOTONIC`.
+        /// When the client asked, in ns of `CLOCK_MONOTONIC`.
         pub issued_ns: u64,
-        /// For how long it may be answered, in ms: as long as its asker waits.
+        /// How long after that it may be answered, in ms: as long as the client waits.
         pub lifetime_ms: u32,
-        /// What is to be done.
+        /// What the hands do.
         pub kind: Tag<WorldAskKind>,
         /// Column of the node.
         pub x: u8,
         /// Row of the node.
         pub y: u8,
-        /// Where the robot is to look, or which of the node's edges is meant.
+        /// Where the robot must look, or which of the node's edges is meant.
         pub heading: Tag<Heading>,
     }
 }
 
 impl WorldAsk {
-    /// Whether its time is over at `now_ns`, as with [`Ask::is_over`].
+    /// Whether its time is over at `now_ns`, as in [`Ask::is_over`].
     pub fn is_over(&self, now_ns: u64) -> bool {
         is_over(self.issued_ns, self.lifetime_ms, now_ns)
     }
 }
 
 payload! {
-    /// What became of a request to the simulated world.
+    /// The result of a request to the simulated world.
     pub struct WorldAnswer: 8 bytes {
-        /// What became of it.
+        /// The result.
         pub outcome: Tag<Outcome>,
-        /// Why it was refused.
+        /// Why the request was refused.
         pub refusal: Tag<WorldRefusal>,
         /// Always 0.
         #[serde(skip)]
@@ -184,9 +170,9 @@ payload! {
 }
 
 payload! {
-    /// The bridge's answer: the outcome and what is now in force.
-    pub struct Answer: 8 bytes {
-        /// What became of the request.
+    /// The bridge's answer: the result and what is now in force.
+    pub struct BridgeAnswer: 8 bytes {
+        /// The result of the request.
         pub outcome: Tag<Outcome>,
         /// The mode in force.
         pub mode: Tag<Mode>,

@@ -1,25 +1,13 @@
-//! What the sensor board sees: `sensor/line` and `sensor/distance`.
+//! What the sensor board sees: [`LineFrame`] on `sensor/line`, [`DistanceFrame`] on
+//! `sensor/distance`.
 
+use lager_sample::{Tag, payload};
 use lager_wire::LineState;
-
-use crate::schema::payload;
-use crate::tag::{Tag, coded_as_is};
-
-coded_as_is!(LineState {
-    OnLine,
-    NotOnLine,
-    LeftOfLine,
-    RightOfLine,
-    StationToLeft,
-    StationToRight,
-    FourWay,
-    DropStation,
-});
 
 payload! {
     /// One line packet of the sensor board.
     pub struct LineFrame: 8 bytes {
-        /// Which life of the link to the board this came from.
+        /// The life of the link to the board from which this came.
         pub link_epoch: u32,
         /// The eleven sensors, bit 10 = leftmost; `0xFFFF` if the board sent only the state.
         pub bits: u16 = Self::NO_BITS,
@@ -31,16 +19,16 @@ payload! {
 }
 
 impl LineFrame {
-    /// `bits` when the board sent only the state.
+    /// The value of `bits` when the board sent only the state.
     pub const NO_BITS: u16 = 0xFFFF;
 }
 
 payload! {
     /// One distance packet of the sensor board.
     pub struct DistanceFrame: 8 bytes {
-        /// Which life of the link to the board this came from.
+        /// The life of the link to the board from which this came.
         pub link_epoch: u32,
-        /// Distance to what is in front, in cm; 255 = nothing in range.
+        /// Distance to the next thing in front, in cm; 255 = nothing in range.
         pub distance_cm: u8 = 255,
         /// The packet's id on the wire, 0..=15.
         pub packet_id: u8,

@@ -1,9 +1,9 @@
-//! The simulated world as it really is: `truth/pose`. Only a simulator publishes it.
+//! [`Truth`]: the simulated world as it really is, on `truth/pose`. Real robots do not publish it.
+
+use lager_floor::Heading;
 
 use super::SERVO_UNKNOWN;
-use super::nav::Heading;
-use crate::schema::payload;
-use crate::tag::{Tag, coded};
+use lager_sample::{Tag, coded, payload};
 
 coded! {
     /// Where a piece of goods is.
@@ -45,21 +45,21 @@ payload! {
         pub x: u8,
         /// Row of the edge's left or lower node.
         pub y: u8,
-        /// Where the edge leaves that node: right or up.
+        /// The direction of the edge from that node: right or up.
         pub heading: Tag<Heading>,
-        /// 1 = it came by chance and goes again by itself.
+        /// 1 = it came by chance and goes away by itself.
         pub by_chance: u8,
     }
 }
 
 payload! {
-    /// The world: enough to resume it in another process.
+    /// The world. This is enough to resume the world in another process.
     pub struct Truth: 5456 bytes {
         /// Robot time since the start of the world in ns.
         pub time_ns: u64,
-        /// Middle of the axle in mm.
+        /// Middle of the axle in mm, x to the right.
         pub x_mm: f64,
-        /// Middle of the axle in mm.
+        /// Middle of the axle in mm, y up.
         pub y_mm: f64,
         /// Heading in rad, counter-clockwise from +x.
         pub heading_rad: f64,
@@ -79,13 +79,13 @@ payload! {
         pub servo_position: [u16; 8] = [SERVO_UNKNOWN; 8],
         /// The part of the battery's charge that is left, 0 to 1.
         pub battery_charge: f32 = 1.0,
-        /// How often the body has run into something since the start of the world.
+        /// How often the robot has run into something since the start of the world.
         pub collisions: u32,
         /// The goods.
-        #[serde(with = "crate::list")]
+        #[serde(with = "lager_sample::list")]
         pub goods: [TruthGood; 256],
-        /// What stands on edges.
-        #[serde(with = "crate::list")]
+        /// The things that stand on edges.
+        #[serde(with = "lager_sample::list")]
         pub obstacles: [TruthObstacle; 64],
         /// How many of `obstacles` are used.
         pub obstacle_count: u16,
@@ -101,7 +101,7 @@ impl Truth {
         &self.goods[..usize::from(self.good_count).min(self.goods.len())]
     }
 
-    /// What stands on edges.
+    /// The things that stand on edges.
     pub fn obstacles(&self) -> &[TruthObstacle] {
         &self.obstacles[..usize::from(self.obstacle_count).min(self.obstacles.len())]
     }

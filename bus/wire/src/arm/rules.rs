@@ -1,7 +1,6 @@
-//! The rules that a profile of the arm has to keep, and the sentences for a profile that breaks
-//! one.
+//! The rules for a profile of the arm, and the sentences about a profile that breaks one.
 //!
-//! The rules look at values and places alone, so that a board checks them in little flash. The
+//! The rules use only values and their places, so that a board checks them in little flash. The
 //! sentences are for the person who wrote the configuration.
 
 use core::fmt;
@@ -25,25 +24,25 @@ pub enum ArmProfileError {
         /// `torque_limit`.
         torque_limit: u16,
     },
-    /// Limits that no position is inside of, or that no servo reaches.
+    /// Limits that contain no position, or that no servo reaches.
     Limits {
         /// The joint.
         joint: &'static str,
         /// Its limits.
         limits: ArmLimits,
     },
-    /// A place outside the joint's limits.
+    /// A position outside the joint's limits.
     Outside {
-        /// The key of the place.
+        /// The key of the position.
         key: &'static str,
         /// The joint.
         joint: &'static str,
-        /// Where it would be sent.
+        /// The position to which the joint would go.
         position: u16,
         /// The joint's limits.
         limits: ArmLimits,
     },
-    /// The open gripper is the closed one.
+    /// The open and the closed gripper have the same position.
     NoGrip {
         /// `gripper_open` and `gripper_closed`.
         position: u16,
@@ -89,18 +88,18 @@ impl fmt::Display for ArmProfileError {
 
 impl core::error::Error for ArmProfileError {}
 
-/// A rule that values break, by their places.
+/// A rule that values break, with the places of those values.
 #[derive(Clone, Copy)]
 pub(super) enum Rule {
-    /// The value at this place is no torque or load.
+    /// The value at this place is not a torque or a load.
     Strength(u8),
     /// The load of a squeeze is above the torque limit.
     Squeeze,
-    /// The limits at this place are none.
+    /// The values at this place are not limits.
     Limits(u8),
     /// The position at the first place is outside the limits at the second.
     Outside(u8, u8),
-    /// The open gripper is the closed one.
+    /// The open and the closed gripper have the same position.
     NoGrip,
 }
 
@@ -112,7 +111,7 @@ const FIRST_LIMITS: u8 = 4;
 const GRIPPER_LIMITS: u8 = 14;
 const NEUTRAL: u8 = 16;
 const DROP: u8 = 20;
-/// How many joints a pose has; their limits come first and in the same order.
+/// The number of joints in a pose. Their limits come first and in the same order.
 const POSE: u8 = 4;
 
 const JOINTS: [&str; 6] = ["base", "shoulder", "elbow", "wrist", "rotation", "gripper"];

@@ -1,4 +1,4 @@
-//! The board's end of a line: asks with SYN until the Pi answers, then counts ids both ways.
+//! [`BoardLink`]: the board's end. It sends SYN until the Pi answers, then counts ids both ways.
 //!
 //! ```text
 //!            ACK/raspi
@@ -19,10 +19,10 @@ use crate::payload::Payload;
 /// How long the board waits for an answer before it asks again, in microseconds (AMB-51).
 const SYN_PERIOD_US: u32 = 100_000;
 
-/// What a board's link has to tell its board.
+/// An event of a board's link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardEvent {
-    /// The Pi has answered: data may be sent.
+    /// The Pi has answered, so the board may send data.
     Up,
     /// A packet from the Pi.
     Packet(Packet),
@@ -36,7 +36,7 @@ pub struct BoardLink {
     gap_us: u32,
     decoder: Decoder,
     up: bool,
-    /// Whether it has ever been up.
+    /// Whether the link has ever been up.
     was_up: bool,
     /// When the next SYN is due; `None` means at once.
     syn_due_us: Option<u32>,
@@ -44,13 +44,13 @@ pub struct BoardLink {
     next_id: PacketId,
     last_received: PacketId,
     lost: u8,
-    /// Packets that a gap has cut off; the decoder does not know of time.
+    /// Packets that a gap in time has cut off. The decoder does not know the time.
     cut_off: u8,
 }
 
 impl BoardLink {
-    /// A link that is not up. A silence longer than `gap_us` microseconds in the middle of a
-    /// packet gives that packet up; about two byte times are enough (AMB-9).
+    /// A link that is not up. A silence longer than `gap_us` microseconds in the middle of a packet
+    /// ends that packet; about two byte times are enough (AMB-9).
     pub const fn new(sign: Callsign, reset: ResetCause, gap_us: u32) -> Self {
         Self {
             sign,
@@ -68,7 +68,7 @@ impl BoardLink {
         }
     }
 
-    /// The SYN to send now, if one is due. Call it once per loop and send what it gives.
+    /// The SYN to send now, if one is due. Call this once per loop and send the result.
     pub fn poll(&mut self, now_us: u32) -> Option<[u8; PACKET_LENGTH]> {
         if self.us_to_syn(now_us)? > 0 {
             return None;
@@ -90,11 +90,11 @@ impl BoardLink {
             return None;
         }
         let left = self.syn_due_us.map_or(0, |due| due.wrapping_sub(now_us));
-        // More than a period away means past: the clock wraps.
+        // More than a period ahead means in the past, because the clock wraps.
         Some(if left > SYN_PERIOD_US { 0 } else { left })
     }
 
-    /// Takes a byte from the Pi that came at `now_us`.
+    /// Takes a byte from the Pi, received at `now_us`.
     pub fn push(&mut self, byte: u8, now_us: u32) -> Option<BoardEvent> {
         if self.decoder.is_midway() && now_us.wrapping_sub(self.last_byte_us) > self.gap_us {
             self.decoder.reset();
@@ -127,7 +127,7 @@ impl BoardLink {
                 None
             }
             SynAck::Ack => {
-                // The Pi restarts its ids with every ACK, also with one that repeats.
+                // The Pi restarts its ids with every ACK, even with a repeated one.
                 self.last_received = PacketId::BEFORE_FIRST;
                 if self.up {
                     return None;
@@ -140,8 +140,8 @@ impl BoardLink {
         }
     }
 
-    /// The bytes of the next data packet; `None` while the link is not up, and for handshakes,
-    /// which are the link's own business.
+    /// The bytes of the next data packet. `None` while the link is not up, and for handshakes,
+    /// which the link sends itself.
     pub fn encode(&mut self, payload: Payload) -> Option<[u8; PACKET_LENGTH]> {
         if !self.up || matches!(payload, Payload::Handshake(_)) {
             return None;
@@ -156,12 +156,12 @@ impl BoardLink {
         self.up
     }
 
-    /// Packets from the Pi that never came: a lower bound, from the board's start, up to 255.
+    /// Packets from the Pi that never came, since the board's start, up to 255; there may be more.
     pub const fn lost_packets(&self) -> u8 {
         self.lost
     }
 
-    /// Packets from the Pi that came damaged or cut off, from the board's start, up to 255.
+    /// Damaged or cut-off packets from the Pi, since the board's start, up to 255.
     pub fn bad_packets(&self) -> u8 {
         let counters = self.decoder.counters();
         let refused = counters.bad_crc.saturating_add(counters.bad_content);

@@ -1,13 +1,13 @@
-//! What makes the Pi believe that a board is there: runs of SYNs, runs of data.
+//! [`Evidence`]: shows the Pi that a board is there, from several SYNs or data packets in a row.
 //!
-//! A version-1 SYN proves itself by its check value. Nothing protects an original packet, so a
-//! handshake without a check value is believed only if no damaged version-1 handshake could look
-//! like it: if it is repeated, in a stream without stray bytes and without a version-1 packet in
-//! between, and if no version-1 packet has come for a while. Two version-1 packets in a row show
-//! that a board that was believed to be an original one is not. A board that sends what only the
-//! other board can send is asked again who it is.
+//! The check value proves a version-1 SYN. Nothing protects an original packet, so the Pi believes
+//! a handshake without a check value only if it cannot be a damaged version-1 handshake. For this
+//! it must be repeated, without stray bytes and without a version-1 packet in between, and no
+//! version-1 packet may have come for a while. Two version-1 packets in a row show that a board
+//! taken for an original one is not an original one. A board that sends what only the other board
+//! can send is asked again who it is.
 //!
-//! It is apart from the link because it only judges what was received: it keeps no state of the
+//! It is apart from the link because it only judges received packets: it keeps no state of the
 //! peer, counts no losses and sends nothing.
 
 use core::time::Duration;
@@ -16,18 +16,18 @@ use super::handshake;
 use crate::handshake::{Callsign, ResetCause, SynAck, Version};
 use crate::packet::{PACKET_LENGTH, Packet, PacketId};
 
-/// How long no version-1 packet may have come before an original board is believed.
+/// How long no version-1 packet may have come before the Pi believes in an original board.
 const ORIGINAL_AFTER: Duration = Duration::from_millis(300);
-/// How many original SYNs in a row are believed when they are alike but for the id.
+/// How many original SYNs in a row are enough if they are alike except for the id.
 const ORIGINAL_SYNS: u8 = 3;
-/// How many are believed when only their meaning is alike: an original board does not clear the
-/// payload bytes it does not use, so they may differ from SYN to SYN.
+/// How many are enough if only their meaning is alike: an original board does not clear the payload
+/// bytes that it does not use, so these may differ from SYN to SYN.
 const ORIGINAL_SYNS_UNLIKE: u8 = 6;
-/// How many version-1 SYNs in a row are a reboot when they come after data.
+/// How many version-1 SYNs in a row mean a reboot if they come after data.
 const REBOOT_SYNS: u8 = 2;
 /// How many packets with consecutive ids show that an original board is running.
 const RUNNING_PACKETS: u8 = 8;
-/// Up to how many wrong bits an original SYN is taken for a damaged version-1 SYN.
+/// An original SYN with at most this many wrong bits may be a damaged version-1 SYN.
 const DAMAGE_BITS: u32 = 3;
 
 /// A SYN from a board.
@@ -35,18 +35,18 @@ const DAMAGE_BITS: u32 = 3;
 pub(super) struct Syn {
     pub(super) version: Version,
     pub(super) callsign: Callsign,
-    /// The packet; an original one's without its id.
+    /// The packet; for an original one, without its id.
     pub(super) bytes: [u8; PACKET_LENGTH],
-    /// How many bytes the original's decoder had skipped by then.
+    /// How many bytes the original's decoder had skipped until then.
     pub(super) skipped: u32,
 }
 
-/// SYNs in a row from one board by one version.
+/// SYNs in a row from one board in one version.
 #[derive(Clone, Copy, Debug)]
 struct SynRun {
     last: Syn,
     count: u8,
-    /// How many of the last ones were alike in every byte.
+    /// How many of the last SYNs were alike in every byte.
     alike: u8,
 }
 
@@ -58,26 +58,26 @@ struct DataRun {
     count: u8,
 }
 
-/// What has been heard of a board.
+/// The packets received from a board, as far as they are evidence.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Evidence {
     syns: Option<SynRun>,
     data: Option<DataRun>,
-    /// When listening began or a version-1 packet last came, whichever is later.
+    /// When listening began or the last version-1 packet came, whichever is later.
     without_one_since: Option<Duration>,
     /// The id of the last version-1 packet.
     last_one: Option<PacketId>,
 }
 
 impl Evidence {
-    /// Listening begins at `now`, unless it has begun.
+    /// Listening begins at `now`, unless it has already begun.
     pub(super) fn listen(&mut self, now: Duration) {
         self.without_one_since.get_or_insert(now);
     }
 
-    /// A version-1 packet has come; whether it goes on where the one before it was. What looked
-    /// like an original board's packets before it was this board's: a hole in its stream must not
-    /// let the next damaged packet add to them.
+    /// Notes a version-1 packet; returns whether its id follows that of the one before. Packets
+    /// before it that looked like an original board's came from this board, so they are forgotten:
+    /// after a gap in the stream the next damaged packet must not be added to them.
     pub(super) fn heard_one(&mut self, id: PacketId, now: Duration) -> bool {
         self.without_one_since = Some(now);
         self.data = None;
@@ -86,18 +86,18 @@ impl Evidence {
         before.is_some_and(|before| before.next() == id)
     }
 
-    /// Something has come that no waiting board sends.
+    /// Notes a packet that no waiting board sends.
     pub(super) fn break_syns(&mut self) {
         self.syns = None;
     }
 
-    /// Something has come that no running board sends.
+    /// Notes a packet that no running board sends.
     pub(super) fn break_data(&mut self) {
         self.data = None;
     }
 
-    /// Whether a board's SYN is believed with those before it. `after_data`: the board was up and
-    /// has sent data, so one stray SYN must not bring it down.
+    /// Whether a board's SYN is enough, with those before it. `after_data`: the board was up and
+    /// has sent data, so one stray SYN must not end the link.
     pub(super) fn believes_syn(&mut self, syn: Syn, after_data: bool, now: Duration) -> bool {
         if syn.version == Version::Original && is_damaged_one(&syn.bytes) {
             self.syns = None;
@@ -128,7 +128,7 @@ impl Evidence {
         }
     }
 
-    /// The original board that `packet`, with those before it, shows to be running.
+    /// The running original board that `packet` and those before it prove.
     pub(super) fn believes_data(&mut self, packet: &Packet, now: Duration) -> Option<Callsign> {
         let Some(callsign) = packet.payload.kind().comes_only_from() else {
             self.data = None;
@@ -155,8 +155,8 @@ impl Evidence {
 }
 
 impl Syn {
-    /// Whether this SYN goes on where `last` was. Noise on the line of a version-1 board leaves
-    /// stray bytes between what looks like original SYNs; an original board leaves none.
+    /// Whether this SYN follows `last` directly. Noise on the line of a version-1 board leaves
+    /// stray bytes between bytes that look like original SYNs; an original board leaves none.
     fn continues(&self, last: &Self) -> bool {
         self.version == last.version
             && self.callsign == last.callsign
@@ -165,8 +165,8 @@ impl Syn {
 }
 
 /// Whether an original SYN is really a version-1 SYN with a few wrong bits. Line faults can be
-/// steady, and then damaged SYNs are alike. A damaged header may also make the same bytes read as
-/// a SYN that starts elsewhere in the round of eleven, so every turn of it is compared.
+/// steady, and then damaged SYNs are alike. With a damaged header, the same bytes may also be read
+/// as a SYN that starts elsewhere in the eleven bytes, so this compares every rotation.
 fn is_damaged_one(bytes: &[u8; PACKET_LENGTH]) -> bool {
     let signs = [Callsign::Sensor, Callsign::Steering];
     signs.into_iter().any(|sign| {

@@ -1,4 +1,4 @@
-//! The Pi's receiving end of a line: finds out who is there, by which version, and what was lost.
+//! [`HostLink`]: the Pi's receiving end. It finds out the board, its version, and what was lost.
 //!
 //! ```text
 //!          version-1 SYN, CRC fits                     -> SendAck(up)
@@ -15,12 +15,12 @@
 //!  up:   SYN before any data since the ACK             -> SendAck: the ACK was lost
 //!        SYN after data, the second (original: third)  -> SendAck(up)
 //!
-//!  A version-1 board that comes up again has rebooted if it says that it has not been up since it
-//!  started, whether it was silent in between or not; an original one if it asked while it was up.
+//!  A version-1 board that comes up again has rebooted if its SYN says that it has not been up
+//!  since its start, even after a silence; an original one if it asked while it was up.
 //! ```
 //!
-//! Each time a board comes up a new epoch starts: counters begin at 0 and nothing from before
-//! counts as lost. This end never sends; it asks the transmitter to.
+//! Each time a board comes up a new epoch starts: counters begin at 0, and nothing from before
+//! counts as lost. This end never sends; it asks the transmitter to send.
 
 use core::time::Duration;
 
@@ -37,51 +37,51 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// A board has come up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Up {
-    /// Which board.
+    /// The board.
     pub callsign: Callsign,
-    /// The rules it speaks by.
+    /// The version of the rules that it uses.
     pub version: Version,
     /// The new epoch's number; the first is 1.
     pub epoch: u32,
-    /// Why the board last started; `Unknown` from an original one.
+    /// Why the board last started; `Unknown` from an original board.
     pub reset: ResetCause,
-    /// Whether it has rebooted since this link had it up before.
+    /// Whether the board has rebooted since it was last up on this link.
     pub rebooted: bool,
-    /// Whether it says that no link has had it up since it started.
+    /// Whether the board says that no link has been up since the board started.
     pub fresh: bool,
 }
 
-/// What the receiving end asks for or tells.
+/// An event of the receiving end: something to send, or news.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HostEvent {
     /// Send a SYN.
     SendSyn,
-    /// Send an ACK of the link's version. Without `up` it repeats one that was lost.
+    /// Send an ACK of the link's version. Without `up` it repeats an ACK that was lost.
     SendAck {
-        /// The board that has come up with it.
+        /// The board that has come up with this ACK.
         up: Option<Up>,
     },
-    /// An original board was found running; there is nothing to answer.
+    /// An original board was found running. No answer is needed.
     Up(Up),
     /// A data packet.
     Packet(Packet),
-    /// The board has said nothing for a second, or what only the other board or one of the other
-    /// version can say, and is no longer up.
+    /// The board is no longer up: it has sent nothing for a second, or something that only the
+    /// other board or a board of the other version can send.
     Silent,
 }
 
-/// How a link is doing, since its epoch began. The counters wrap.
+/// The state of a link since its epoch began. The counters wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkCounters {
-    /// How many times a board has come up; 0 before the first.
+    /// How many times a board has come up; 0 before the first time.
     pub epoch: u32,
     /// How many of these were reboots.
     pub reboots: u32,
     /// Data packets received.
     pub packets: u32,
-    /// Data packets that never came: a lower bound, since ids are modulo 16.
+    /// Data packets that never came; there may be more, because ids are modulo 16.
     pub lost: u32,
-    /// Packets whose check value did not fit.
+    /// Packets with a wrong check value.
     pub bad_crc: u32,
     /// Packets whose content broke a rule.
     pub bad_content: u32,
@@ -95,7 +95,7 @@ struct Peer {
     version: Version,
     /// Whether data has come since the last ACK.
     data_seen: bool,
-    /// The last data packet's id; `None` starts the count at whatever comes.
+    /// The last data packet's id; `None` starts the count at the next packet.
     last_id: Option<PacketId>,
     last_heard: Duration,
 }
@@ -111,9 +111,9 @@ pub struct HostLink {
     evidence: Evidence,
     syn_due: Duration,
     counters: LinkCounters,
-    /// The rules by which damage is counted: those of the epoch, version 1 before the first.
+    /// The rules by which damage is counted: those of the epoch; before the first epoch, version 1.
     judged_by: Version,
-    /// What that version's decoder had counted when the epoch began.
+    /// The counters of that version's decoder when the epoch began.
     before: DecoderCounters,
 }
 
@@ -124,7 +124,7 @@ impl Default for HostLink {
 }
 
 impl HostLink {
-    /// A link that knows nothing of its board.
+    /// A link that does not know its board yet.
     pub fn new() -> Self {
         Self {
             one: Decoder::new(Version::One),
@@ -139,8 +139,8 @@ impl HostLink {
         }
     }
 
-    /// A link that counts its epochs on from `epoch`, for a service that takes up the work of one
-    /// that has ended: what comes now must not look like a continuation of what came then.
+    /// A link whose epochs continue after `epoch`, for a service that takes over from an ended one:
+    /// new packets must not look like a continuation of the old ones.
     pub fn after_epoch(epoch: u32) -> Self {
         let mut link = Self::new();
         link.counters.epoch = epoch;
@@ -158,7 +158,7 @@ impl HostLink {
             let packet = self.one.push(byte)?;
             return self.take_one(packet, byte, now);
         }
-        // As long as version 1 is not certain both rules listen.
+        // Until version 1 is certain, this listens by both rules.
         self.evidence.listen(now);
         let one = self.one.push(byte);
         let original = self.original.push(byte);
@@ -170,8 +170,8 @@ impl HostLink {
         self.take_original(original?, now)
     }
 
-    /// What is due at `now` without a byte: a SYN, or the board has fallen silent. Call it until
-    /// it gives nothing.
+    /// An event that is due at `now` without a byte: a SYN, or the board has fallen silent. Call it
+    /// until it returns `None`.
     pub fn poll(&mut self, now: Duration) -> Option<HostEvent> {
         self.evidence.listen(now);
         if self.next_due() > now {
@@ -184,7 +184,7 @@ impl HostLink {
         Some(HostEvent::SendSyn)
     }
 
-    /// When `poll` next has something to say if no byte comes.
+    /// When `poll` has its next event if no byte comes.
     pub fn next_due(&self) -> Duration {
         match &self.peer {
             Some(peer) => peer.last_heard + SILENCE,
@@ -192,7 +192,7 @@ impl HostLink {
         }
     }
 
-    /// How the link is doing in its present epoch, also after the board has fallen silent.
+    /// The link's state in its present epoch, even after the board has fallen silent.
     pub fn health(&self) -> LinkCounters {
         let decoder = match self.judged_by {
             Version::One => self.one.counters(),
@@ -212,7 +212,7 @@ impl HostLink {
         self.peer.map(|peer| peer.callsign)
     }
 
-    /// The rules the board speaks by, while it is up.
+    /// The version of the rules that the board uses, while it is up.
     pub fn version(&self) -> Option<Version> {
         self.peer.map(|peer| peer.version)
     }
@@ -223,15 +223,15 @@ impl HostLink {
     }
 
     fn take_one(&mut self, packet: Packet, end: u8, now: Duration) -> Option<HostEvent> {
-        // An original packet's end byte is the right check value once in 256 times, so such a
-        // packet says nothing about the version.
+        // An original packet's end byte is the right check value once in 256 times. Such a packet
+        // says nothing about the version.
         let in_a_row = end != END && self.evidence.heard_one(packet.id, now);
         match packet.payload {
             Payload::Handshake(handshake) => {
                 let bytes = packet.encode(Version::One);
                 self.take_handshake(handshake, bytes, now)
             }
-            // It was taken for an original board and is none. Asked again, it says what it is.
+            // It was taken for an original board and is not one. Asked again, it says so.
             _ if in_a_row && self.version() == Some(Version::Original) => Some(self.go_down(now)),
             _ => self.take_data(packet, Version::One, now),
         }
@@ -263,8 +263,8 @@ impl HostLink {
     fn take_data(&mut self, packet: Packet, version: Version, now: Duration) -> Option<HostEvent> {
         let peer = self.peer.as_mut().filter(|peer| peer.version == version)?;
         if packet.payload.kind().comes_only_from() == Some(other_board(peer.callsign)) {
-            // Noise from an original board's line. By version 1 rather the SYN was wrong: four or
-            // more wrong bits can pass the check. Asked again, the board says who it is.
+            // By the original's rules this is noise. By version 1 the SYN was probably wrong,
+            // because four or more wrong bits can pass the check. Asked again, it says so.
             return (version == Version::One).then(|| self.go_down(now));
         }
         if let Some(last) = peer.last_id {

@@ -1,4 +1,4 @@
-//! Both ends of a line as pure machines: handshake, ids, loss.
+//! Both ends of a line as pure state machines: they shake hands, count ids and find losses.
 //!
 //! ```text
 //!  board                                   Pi
@@ -11,11 +11,11 @@
 //!    | -- SYN/board at once ---------------> |   the board keeps running, only the ids restart
 //! ```
 //!
-//! A board's SYN says whether the link has been up since the board started. So a reset can be told
-//! from a cut line, even after a silence in which the Pi has asked too.
+//! A board's SYN says whether the link has been up since the board started. So the Pi can tell a
+//! reset from a cut line, even after a silence in which the Pi has asked too.
 //!
-//! Handshake packets are not counted and carry id 0. Both ends stand beside each other so that they
-//! are tested against each other. Neither does input or output, and neither reads a clock.
+//! Handshake packets are not counted and carry id 0. Both ends stand beside each other so that
+//! tests run them against each other. Neither does input or output, and neither reads a clock.
 
 mod board;
 mod evidence;

@@ -1,7 +1,7 @@
-//! The Pi's sending end: numbers packets and knows which version the board takes.
+//! [`HostTransmitter`]: the Pi's sending end. It numbers packets and knows the board's version.
 //!
-//! It is apart from the receiving end because different threads read and write the port. What the
-//! receiving end wants to send is handed to this one.
+//! It is apart from the receiving end because different threads read and write the port. The
+//! receiving end hands this one what it wants to send.
 
 use super::handshake;
 use crate::handshake::{Callsign, ResetCause, SynAck, Version};
@@ -24,28 +24,28 @@ impl HostTransmitter {
         }
     }
 
-    /// The question to a board that may be running already. It is always version 1: an original
-    /// board does not look at what is new in it.
+    /// The question to a board that may already be running. It is always of version 1: an original
+    /// board ignores the new bytes.
     pub fn syn(&self) -> [u8; PACKET_LENGTH] {
         let (sign, reset) = (Callsign::Raspi, ResetCause::Unknown);
         handshake(SynAck::Syn, sign, reset, Version::One, false)
     }
 
-    /// The answer to a board's SYN; data packets are numbered from 0 after it.
+    /// The answer to a board's SYN. Data packets after it are numbered from 0.
     pub fn ack(&mut self, version: Version) -> [u8; PACKET_LENGTH] {
         self.adopt(version);
         let (sign, reset) = (Callsign::Raspi, ResetCause::Unknown);
         handshake(SynAck::Ack, sign, reset, version, false)
     }
 
-    /// Starts sending to a board that was found running and takes no ACK.
+    /// Starts to send to a board that was found running and gets no ACK.
     pub fn adopt(&mut self, version: Version) {
         self.version = Some(version);
         self.next_id = PacketId::new(0);
     }
 
     /// The bytes of the next data packet. `None` before the first ACK, for handshakes, and for
-    /// what an original board does not know: it takes only commands.
+    /// anything but commands to an original board, which knows nothing else.
     pub fn encode(&mut self, payload: Payload) -> Option<[u8; PACKET_LENGTH]> {
         let version = self.version?;
         let understood = match payload {

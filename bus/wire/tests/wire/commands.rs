@@ -1,4 +1,4 @@
-//! Codes, the conversion table and the three text forms.
+//! Command codes: the conversion table and the three text forms.
 
 use std::collections::BTreeSet;
 
@@ -188,7 +188,7 @@ fn an_original_command_may_be_a_number_or_eight_characters() {
         Packet::decode(&bytes, Version::Original),
         Ok(packet(3, command))
     );
-    // Anything else is the number in the first byte, whatever stands behind it.
+    // Any other payload is the number in its first byte; the rest does not matter.
     let bytes = original(3, 4, 9, *b"0001012", 0x42);
     assert_eq!(
         Packet::decode(&bytes, Version::Original),

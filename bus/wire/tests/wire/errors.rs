@@ -1,8 +1,8 @@
 //! Every error of one, two or three bits in a version-1 packet is refused.
 //!
-//! All 88 bits of the packet are tried, those of kind and length included: the window is always
-//! eleven bytes and the check covers it whole, so a kind that turns into another one does not help
-//! an error through.
+//! The test tries all 88 bits of the packet, those of kind and length too. The window is always
+//! eleven bytes and the check value covers all of it, so an error that changes the kind is found
+//! too.
 
 use lager_wire::{Callsign, Decoder, Handshake, Packet, Payload, ResetCause, SynAck, Version};
 
@@ -46,7 +46,7 @@ fn for_each_error(good: [u8; 11], mut check: impl FnMut(&[u8; 11], [usize; 3])) 
 #[test]
 fn every_error_of_up_to_three_bits_is_refused_in_every_kind_of_packet() {
     for (number, payload) in (0_u8..).zip(payloads()) {
-        // Handshakes carry id 0; the others are tried with ids all over the range.
+        // Handshakes carry id 0. The others are tried with many ids.
         let id = match payload {
             Payload::Handshake(_) => 0,
             _ => number.wrapping_mul(7),
@@ -86,9 +86,9 @@ fn the_decoder_gives_nothing_for_a_damaged_packet_alone() {
     }
 }
 
-/// Behind a damaged packet the window slides over its rest and into the packets that follow, and
-/// a window that begins in the middle may fit by chance. Nothing but the packets that were sent
-/// comes out here, and each of those comes out.
+/// After a damaged packet the window moves over its rest and into the next packets, and a window
+/// that begins in the middle may fit by chance. The decoder must return exactly the packets that
+/// were sent.
 #[test]
 fn a_damaged_packet_between_good_ones_costs_only_itself() {
     for payload in payloads() {
@@ -120,7 +120,7 @@ fn a_damaged_packet_between_good_ones_costs_only_itself() {
 
 #[test]
 fn bytes_without_a_meaning_must_be_zero() {
-    // Rebuilt with a check value that fits, so that only the rule about content is left.
+    // Gives the bytes a right check value, so that only the rule about the content is left.
     let refit = |mut bytes: [u8; 11]| {
         let fits = |end: &u8| {
             let mut with_end = bytes;

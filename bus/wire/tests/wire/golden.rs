@@ -1,5 +1,5 @@
-//! Bytes that are fixed. If a test here fails, do not change the test: robots in the field and
-//! recordings speak these bytes.
+//! Fixed bytes. If a test here fails, do not change the test: robots in the field and recordings
+//! use these bytes.
 //!
 //! Source of the original's bytes: `packet.h` of the technical documentation, appendix B.1,
 //! compiled with avr-gcc 5.4.0 for the ATmega1284P (with and without -fshort-enums) and with gcc
@@ -179,8 +179,8 @@ fn full_size_packets_of_the_original() {
 
 #[test]
 fn version_one_packets() {
-    // The payload bytes are the layouts of this project's wire description; the last byte is
-    // CRC-8/AUTOSAR of the ten before it, computed bit by bit with an independent routine.
+    // The payload bytes follow this project's wire description. The last byte is CRC-8/AUTOSAR of
+    // the ten before it, computed bit by bit with an independent routine.
     let asking_again = Handshake {
         kind: SynAck::Syn,
         sign: Callsign::Steering,

@@ -11,7 +11,7 @@ use crate::sample::Noise;
 const BYTE_US: u64 = 20;
 pub(crate) const GAP_US: u32 = 200;
 
-/// What a line does to the bytes on it: once in so many bytes, `None` never.
+/// What a line does to its bytes: each fault once in so many bytes, `None` = never.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Harm {
     pub(crate) loses: Option<u64>,
@@ -19,15 +19,15 @@ pub(crate) struct Harm {
     pub(crate) adds: Option<u64>,
 }
 
-/// A board and the Pi on one line, stepped by the millisecond. The board sends data every
-/// 5 ms, the Pi a command every 40 ms, both as soon as they may.
+/// A board and the Pi on one line, in steps of 1 ms. The board sends data every 5 ms, the Pi a
+/// command every 40 ms, both as soon as they may.
 pub(crate) struct Line {
     pub(crate) board: BoardLink,
     pub(crate) host: HostLink,
     pub(crate) transmitter: HostTransmitter,
     pub(crate) now_us: u64,
     pub(crate) harm: Harm,
-    /// What the board sends.
+    /// The packet that the board sends.
     pub(crate) data: Payload,
     pub(crate) noise: Noise,
     pub(crate) host_events: Vec<HostEvent>,
@@ -48,7 +48,7 @@ impl Line {
             board: board(Callsign::Steering, ResetCause::PowerOn),
             host: HostLink::new(),
             transmitter: HostTransmitter::new(),
-            // The board's clock wraps during the first seconds of every test.
+            // With this start the board's clock wraps during the first seconds of every test.
             now_us: u64::from(u32::MAX) - 700_000,
             harm: Harm::default(),
             data: Payload::SteerData(SteerData {
@@ -137,7 +137,7 @@ impl Line {
         }
     }
 
-    /// What arrives of the bytes that wait in one direction.
+    /// The bytes that arrive, of those that wait in one direction.
     fn pass(&mut self, to_host: bool) -> Vec<u8> {
         let (queue, cut) = if to_host {
             (&mut self.to_host, self.cut_to_host)

@@ -1,4 +1,4 @@
-//! The board's end and the Pi's end against each other.
+//! Runs the board's end and the Pi's end of a line against each other.
 
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ fn a_board_refuses_what_only_boards_send() {
     };
     assert_eq!(heard(&mut line.board, 0, line.data), None);
     assert_eq!(line.board.bad_packets(), 1);
-    // What follows is heard, and one is missing before it.
+    // The next packet is heard, and one before it is missing.
     let command = Payload::SteerCommand(SteerCommand { code: 3, seq: 1 });
     let event = heard(&mut line.board, 1, command);
     assert!(matches!(event, Some(BoardEvent::Packet(packet)) if packet.payload == command));
@@ -107,7 +107,7 @@ fn both_ends_come_up_over_a_line_that_loses_flips_and_adds_bytes() {
     let mut slowest = 0;
     for seed in 0..300 {
         let mut line = Line::new(seed);
-        // The worst damages every fourth byte.
+        // The worst line damages every fourth byte.
         let odds = [200, 50, 20, 12][(seed % 4) as usize];
         line.harm = Harm {
             loses: Some(odds),
@@ -118,8 +118,8 @@ fn both_ends_come_up_over_a_line_that_loses_flips_and_adds_bytes() {
         assert!(line.run_up(300), "seed {seed} never came up");
         slowest = slowest.max((line.now_us - start) / 1_000);
         line.run(3_000);
-        // A check value of eight bits lets one in 256 of the SYNs through that are damaged beyond
-        // three bits, so on the worst line a board may be mistaken for a moment.
+        // A check value of eight bits accepts one in 256 of the SYNs with more than three wrong
+        // bits. So on the worst line the Pi may take a board for another one for a moment.
         let sound = |version, callsign| (version, callsign) == (Version::One, Callsign::Steering);
         let mistaken = line
             .ups()
@@ -159,7 +159,7 @@ fn a_lost_ack_is_repeated_without_a_new_epoch() {
     assert_eq!(repeats, 4);
     assert_eq!(line.ups().len(), 1);
     assert_eq!(line.host.health().lost, 0);
-    // The Pi had numbered commands that never arrived; each ACK begins its count anew.
+    // The Pi had numbered commands that never arrived. Each ACK starts its count again.
     assert_eq!(line.board.lost_packets(), 0);
 }
 
@@ -199,7 +199,7 @@ fn a_repeated_ack_changes_nothing_but_the_count_of_the_pis_ids() {
 fn loss_is_counted_apart_for_each_direction() {
     let mut line = Line::new(1);
     line.run(100);
-    // Three packets of the board are lost, then a few of the Pi's.
+    // Three packets of the board are lost, and then a few of the Pi's.
     line.cut_to_host = true;
     line.run(15);
     line.cut_to_host = false;
@@ -237,7 +237,7 @@ fn damaged_packets_are_counted_where_they_arrive() {
     let health = line.host.health();
     assert!(health.bad_crc > 0 && health.skipped_bytes > 0 && health.lost > 0);
     assert!(line.board.bad_packets() > 0 && line.board.lost_packets() > 0);
-    // What did not arrive whole is missing, and nothing else is.
+    // Packets that did not arrive whole count as missing, and no others.
     let complete = 402 - health.lost;
     assert!(health.packets.abs_diff(complete) <= 16, "{health:?}");
 }

@@ -1,4 +1,4 @@
-//! The wire protocol from outside: bytes in, packets and events out.
+//! The wire protocol from outside: bytes go in, packets and events come out.
 
 mod arm;
 mod commands;

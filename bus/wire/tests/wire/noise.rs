@@ -1,7 +1,7 @@
-//! Ten megabytes of noise, by both rules.
+//! Ten megabytes of noise, by the rules of both versions.
 //!
-//! The decoder has a fixed size and cannot allocate, so "no growth" holds by construction; what is
-//! shown here is that it never panics, how little noise passes, and that it comes back at once.
+//! The decoder has a fixed size and cannot allocate, so it cannot grow. These tests show that it
+//! never panics, that little noise passes, and that it finds the next packet at once.
 
 use lager_wire::{Decoder, Packet, PacketId, Payload, SteerCommand, Version};
 
@@ -9,7 +9,7 @@ use crate::sample::{Noise, distance};
 
 const MEGABYTES_10: usize = 10_000_000;
 
-/// Noise that is as like packets as noise can be: mostly bytes that are headers and lengths.
+/// Noise that is as similar to packets as possible: mostly bytes that are headers and lengths.
 fn hostile(noise: &mut Noise) -> u8 {
     match noise.number() >> 61 {
         0 | 1 => 11,
@@ -36,8 +36,8 @@ fn packets_in_noise(version: Version, seed: u64, byte: fn(&mut Noise) -> u8) -> 
 
 #[test]
 fn noise_hardly_ever_passes_as_a_version_one_packet() {
-    // Expected by the odds: 10 of 16 kinds, 1 of 256 lengths and 1 of 256 check values leave
-    // 95 windows of 10 MB; rules on the content leave well under one.
+    // Expected number: 10 of 16 kinds, 1 of 256 lengths and 1 of 256 check values leave 95 windows
+    // in 10 MB; rules on the content leave far less than one.
     assert_eq!(packets_in_noise(Version::One, 1, Noise::byte), 0);
     let like_packets = packets_in_noise(Version::One, 2, hostile);
     println!("version 1: {like_packets} packets in 10 MB of hostile noise");
@@ -46,12 +46,12 @@ fn noise_hardly_ever_passes_as_a_version_one_packet() {
 
 #[test]
 fn noise_seldom_passes_as_an_original_packet() {
-    // Without a check value only structure is left: a few packets per megabyte. A link believes
-    // none of it before eight consecutive ids.
+    // Without a check value there is only structure: a few packets per megabyte pass. A link
+    // believes none of them before eight consecutive ids.
     let plain = packets_in_noise(Version::Original, 3, Noise::byte);
     println!("original: {plain} packets in 10 MB of noise");
     assert!(plain < 300, "{plain}");
-    // Hostile noise is full of original packets; here it only has to be survived.
+    // Hostile noise is full of original packets. Here the decoder must only survive it.
     let like_packets = packets_in_noise(Version::Original, 4, hostile);
     println!("original: {like_packets} packets in 10 MB of hostile noise");
 }
@@ -92,8 +92,8 @@ fn behind_noise_at_most_one_original_packet_is_missed() {
             .flat_map(|packet| packet.encode(Version::Original))
             .filter_map(|byte| decoder.push(byte))
             .collect();
-        // The last one that was sent is the last one received, and none from the second on is
-        // missing. What noise made up may stand before.
+        // All packets that were sent are received, from the second on at least. Packets made from
+        // noise may stand before them.
         assert!(
             received.ends_with(&sent[1..]),
             "round {round}: {received:?}"
@@ -109,7 +109,7 @@ fn a_decoder_that_is_in_step_gives_an_original_packet_at_its_last_byte() {
         let (last, rest) = bytes.split_last().unwrap();
         for byte in rest {
             let held = decoder.push(*byte);
-            // Only the very first waits, for the header of the second.
+            // Only the first packet waits, for the header of the second.
             assert_eq!(held.is_some(), id == 1 && held == Some(distance(0, 80)));
         }
         assert_eq!(decoder.push(*last).is_some(), id > 0);
@@ -139,11 +139,11 @@ fn a_lost_byte_costs_an_original_board_one_packet() {
     }
 }
 
-/// What a stop leaves on the line: the driver's queue is thrown away wherever the packet in it was
-/// just being sent, and standby follows, again and again.
+/// What a stop leaves on the line: the driver drops its queue, perhaps in the middle of a packet,
+/// and standby follows, again and again.
 ///
-/// A command that lacks nothing but its check can find it in the standby's first byte: then it is
-/// whole, as it was given, and the next standby ends it.
+/// If a cut command lacks only its check value, the standby's first byte may be the right one. Then
+/// the command is complete, as it was given, and the next standby ends it.
 #[test]
 fn a_standby_behind_a_command_cut_in_two_is_taken() {
     for code in 1..=11 {

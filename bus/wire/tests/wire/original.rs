@@ -1,5 +1,5 @@
-//! Original boards: 11-byte packets, an end that means nothing, garbage in unused payload bytes,
-//! ids that run on across SYNs.
+//! Original boards: 11-byte packets, an end byte without meaning, garbage in unused payload bytes,
+//! ids that go on after SYNs.
 
 use std::time::Duration;
 
@@ -39,7 +39,7 @@ impl Pi {
         events
     }
 
-    /// Sends SYNs from `id` on until one is answered; gives the number it took.
+    /// Sends SYNs from `id` on until one is answered; returns how many it sent.
     fn syns_until_up(&mut self, first: u8, mut garbage: impl FnMut(u8) -> [u8; 7]) -> (u8, Up) {
         for count in 0..20 {
             let syn = original(count, 0, first, garbage(count), 0xFF);
@@ -88,7 +88,7 @@ fn two_syns_are_not_enough_however_long_they_take() {
         let syn = original(id, 0, SYN_SENSOR, GARBAGE, 0xFF);
         assert_eq!(pi.take(&syn, 900), []);
     }
-    // The third is answered. Its header is what the first was held for.
+    // The third SYN is answered. The first was held until its header came.
     let syn = original(2, 0, SYN_SENSOR, GARBAGE, 0xFF);
     assert_eq!(pi.take(&syn, 900).len(), 1);
 }
@@ -125,7 +125,7 @@ fn ids_run_on_across_syns_and_the_first_data_starts_the_count() {
     let health = pi.host.health();
     assert_eq!((health.packets, health.lost), (40, 0));
 
-    // Three packets lost: their successor waits for the one behind it, and then they are counted.
+    // Three packets are lost. The next packet waits for the one after it; then the loss is counted.
     assert_eq!(pi.take(&line_packet(count + 43, LineState::OnLine), 12), []);
     assert_eq!(
         pi.take(&line_packet(count + 44, LineState::OnLine), 12)
@@ -240,7 +240,7 @@ fn fewer_than_eight_ids_in_a_row_show_nothing() {
 
 #[test]
 fn a_running_version_one_board_is_never_taken_for_an_original_one() {
-    // Its packets look like original ones; only the check value tells them apart.
+    // The board's packets look like original ones; only the check value shows the difference.
     let mut pi = Pi::new();
     for id in 0..200 {
         let bytes = distance(id, 80).encode(Version::One);
@@ -249,7 +249,7 @@ fn a_running_version_one_board_is_never_taken_for_an_original_one() {
     assert!(!pi.host.is_up());
 }
 
-/// A bridge that is held up for longer than the system keeps bytes reads on in a damaged packet.
+/// If a bridge is delayed for longer than the system keeps bytes, it reads on in a damaged packet.
 #[test]
 fn a_hole_in_what_a_version_one_board_sends_does_not_make_it_an_original_one() {
     let mut pi = Pi::new();
@@ -310,7 +310,7 @@ fn no_version_one_handshake_ends_like_an_original_one() {
             let mut link = board(sign, *reset);
             let syn = link.poll(0).unwrap();
             assert_ne!(syn[10], 0xFF, "{sign:?} {reset:?}");
-            // And when it has been up before.
+            // The same for a board that has been up before.
             let mut pi = HostTransmitter::new();
             for byte in pi.ack(Version::One).into_iter().chain(pi.syn()) {
                 link.push(byte, 0);
@@ -362,7 +362,7 @@ fn the_answer_to_an_original_board_is_the_originals() {
         transmitter.encode(command),
         Some([0x40, 0x0B, 9, 0, 0, 0, 0, 0, 0, 0, 0xFF])
     );
-    // An original board knows no settings; the refused packet uses up no number.
+    // An original board knows no settings. The refused packet uses no number.
     let setting = Payload::Setting(Setting {
         key: SettingKey::GainP,
         seq: 0,
@@ -417,7 +417,7 @@ fn ten_megabytes_of_noise_bring_no_board_up() {
             assert_eq!(event, HostEvent::SendSyn);
         }
     }
-    // And the first whole SYN behind it is answered.
+    // The first whole SYN after it is answered.
     let syn = board(Callsign::Sensor, ResetCause::PowerOn)
         .poll(0)
         .unwrap();

@@ -1,4 +1,4 @@
-//! Boards that reset, services that restart, cables that come out.
+//! Boards that reset, services that restart, cables that are unplugged.
 
 use std::time::Duration;
 
@@ -85,7 +85,7 @@ fn a_restarted_pi_finds_a_running_board_without_resetting_it() {
     assert_eq!(line.received()[0].id.get(), 0);
     assert_eq!(line.host.health().lost, 0);
     assert_eq!(line.board.lost_packets(), 0);
-    // The same board, still in its first life: it came up twice.
+    // The same board, without a restart: it came up twice.
     let ups = line
         .board_events
         .iter()
@@ -150,7 +150,7 @@ fn a_cut_line_is_noticed_after_a_second_and_taken_up_again() {
 
 #[test]
 fn a_board_that_resets_after_a_second_of_silence_has_rebooted() {
-    // Cut both ways, and cut only where the Pi cannot hear: then the board hears the Pi ask.
+    // Cut in both directions, and cut only towards the Pi: then the board hears the Pi ask.
     for cut_to_board in [true, false] {
         for down_ms in [1_100, 5_000] {
             let mut line = Line::new(1);
@@ -178,7 +178,7 @@ fn a_board_that_resets_after_a_second_of_silence_has_rebooted() {
 fn a_board_that_is_asked_again_has_not_rebooted() {
     let mut line = Line::new(1);
     line.run(500);
-    // Somebody else's question: the board answers it, and this end sees it ask.
+    // Another process asks: the board answers, and this end sees the board ask.
     for _ in 0..3 {
         for byte in HostTransmitter::new().syn() {
             let now = line.board_now();
@@ -233,7 +233,7 @@ fn another_board_on_the_same_port_is_believed_at_once() {
 #[test]
 fn a_board_that_was_mistaken_for_the_other_is_asked_again() {
     let mut line = Line::new(1);
-    // A SYN damaged so that it claims another sender and its check value fits all the same.
+    // A damaged SYN that claims another sender although its check value fits.
     for byte in board(Callsign::Sensor, ResetCause::PowerOn)
         .poll(0)
         .unwrap()
@@ -271,7 +271,7 @@ fn the_pis_own_bytes_coming_back_bring_nothing_up() {
     }
 }
 
-/// A steady fault makes damaged SYNs alike; they must not pass for an original board's.
+/// A steady fault makes damaged SYNs alike. The Pi must not take them for an original board's.
 #[test]
 fn a_version_one_syn_damaged_the_same_way_each_time_is_never_believed() {
     let mut tried = 0;
@@ -282,7 +282,7 @@ fn a_version_one_syn_damaged_the_same_way_each_time_is_never_believed() {
     ] {
         let mut asking = board(sign, reset);
         if reset == ResetCause::Unknown {
-            // One that has been up before.
+            // A board that has been up before.
             let mut pi = HostTransmitter::new();
             for byte in pi.ack(Version::One).into_iter().chain(pi.syn()) {
                 asking.push(byte, 0);

@@ -1,4 +1,4 @@
-//! Packets to try things on, and a small generator of reproducible noise.
+//! Packets for the tests, and a small generator of reproducible noise.
 
 use lager_wire::{
     ArmData, BoardStatus, Callsign, Centimetres, Handshake, LineBits, LineReading, LineState,
@@ -40,7 +40,7 @@ pub(crate) fn distance(id: u8, centimetres: u8) -> Packet {
     packet(id, Payload::Distance(Centimetres(centimetres)))
 }
 
-/// An original board's packet: garbage where the payload has no meaning, any end.
+/// An original board's packet: garbage in payload bytes without meaning, and any end byte.
 pub(crate) fn original(id: u8, kind: u8, first: u8, garbage: [u8; 7], end: u8) -> [u8; 11] {
     let mut bytes = [0; PACKET_LENGTH];
     bytes[0] = (id & 0x0F) | (kind << 4);
@@ -51,7 +51,7 @@ pub(crate) fn original(id: u8, kind: u8, first: u8, garbage: [u8; 7], end: u8) -
     bytes
 }
 
-/// Several payloads of every kind that version 1 has: ends of ranges and values between.
+/// Several payloads of every kind of version 1: ends of ranges and values between.
 pub(crate) fn payloads() -> Vec<Payload> {
     let mut payloads = Vec::new();
     for kind in SynAck::ALL {

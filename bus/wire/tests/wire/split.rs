@@ -1,11 +1,11 @@
-//! What comes out depends on the bytes alone, not on how they were cut into reads.
+//! The decoder's packets depend on the bytes alone, not on how reads split them.
 
 use lager_wire::{Decoder, DecoderCounters, Packet, Version};
 use proptest::prelude::*;
 
 use crate::sample::{packet, payloads};
 
-/// What a version-1 stream means, read as a whole: at every place the first eleven bytes are a
+/// The packets of a version-1 stream, read as a whole: at every place the first eleven bytes are a
 /// packet, or one byte is noise.
 fn read_whole(stream: &[u8]) -> (Vec<Packet>, u32) {
     let (mut packets, mut skipped, mut rest) = (Vec::new(), 0, stream);
@@ -24,7 +24,7 @@ fn read_whole(stream: &[u8]) -> (Vec<Packet>, u32) {
     (packets, skipped)
 }
 
-/// Feeds the stream in reads of the given lengths, looking at the decoder between them as a
+/// Feeds the stream in reads of the given lengths, and looks at the decoder between them as a
 /// service does.
 fn read_in_parts(
     version: Version,
@@ -78,7 +78,7 @@ proptest! {
         let (received, counters) = read_in_parts(Version::One, &stream, &lengths);
         prop_assert_eq!(&received, &packets);
         prop_assert_eq!(counters.packets as usize, packets.len());
-        // What is still buffered has been neither given out nor skipped.
+        // Bytes that are still buffered were neither returned nor skipped.
         prop_assert!(counters.skipped_bytes >= skipped);
         prop_assert!(counters.skipped_bytes as usize + 11 * packets.len() <= stream.len());
     }

@@ -1,4 +1,4 @@
-//! What `lager-control` asks of the sensor board.
+//! Implements `lager-control`'s traits of the sensor board.
 
 use lager_avr::{clock, eeprom, reset, uart};
 use lager_control::{Board, SensorBoard};
@@ -12,7 +12,7 @@ pub(crate) struct SensorPins {
 }
 
 impl SensorPins {
-    /// The board, set up.
+    /// The board; its hardware is set up.
     pub(crate) fn new(cause: ResetCause) -> Self {
         Self { cause }
     }

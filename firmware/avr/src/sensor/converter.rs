@@ -1,4 +1,4 @@
-//! The ADC: eleven line sensors one after the other through one input, and the IR ranger (S5, S8).
+//! The ADC: converts eleven line sensors through one input, in turn, then the IR ranger (S5, S8).
 //!
 //! ```text
 //!   sensor n   |-- sample --|------- convert, 13 us -------|-- sample n + 1 --| ... | IR ranger
@@ -6,11 +6,11 @@
 //!   program                                                 | judges n while n + 1 is converted
 //! ```
 //!
-//! The ranger is converted behind the last sensor every time, so that a pass that wants it does not
+//! The ranger is converted after the last sensor in every pass, so a pass that needs it does not
 //! wait.
 //!
-//! The clock of 1 MHz is above what the data sheet promises ten bits at; eight of the line sensors'
-//! bits hold, and the IR ranger's own noise is larger than the two that do not.
+//! The clock of 1 MHz is faster than the datasheet allows for ten bits. Eight bits are exact, which
+//! the line sensors need; the IR ranger's own noise is larger than the other two.
 
 use avr_device::asm::delay_cycles;
 use lager_avr::register::{adc, bit, get, put};
@@ -32,8 +32,8 @@ const LINE: u8 = AVCC | LEFT_ADJUST | pins::LINE_INPUT;
 const IR: u8 = AVCC | pins::IR_INPUT;
 /// Number of line sensors.
 const CHANNELS: u8 = 11;
-/// A conversion's sample is held after a clock of the converter to start and one and a half to
-/// sample.
+/// The converter needs one of its clocks to start and one and a half to sample; then the input may
+/// change.
 const SAMPLING_CYCLES: u32 = 42;
 
 /// Switches the ADC on, with the first line sensor selected.
@@ -43,13 +43,13 @@ pub(crate) fn start() {
     put(adc.admux(), LINE);
     put(adc.adcsra(), ON);
     pins::select_line_sensor(0);
-    // The first conversion sets the converter up and takes 25 clocks.
+    // The first conversion also sets the converter up and takes 25 clocks.
     put(adc.adcsra(), START);
     wait();
 }
 
-/// Reads a line sensor. They are read in order: with the first one the chain of conversions begins,
-/// and each reading starts the next one, which runs while this one is judged.
+/// Reads a line sensor. The caller reads them in order: the first call starts a chain of
+/// conversions, and each call starts the next one, which runs while the caller judges this reading.
 pub(crate) fn read_line_sensor(channel: u8) -> u8 {
     if channel == 0 {
         put(adc().admux(), LINE);
@@ -58,7 +58,7 @@ pub(crate) fn read_line_sensor(channel: u8) -> u8 {
     wait();
     let next = channel + 1;
     if next < CHANNELS {
-        // The reading stays until this conversion ends.
+        // The reading stays in the register until the next conversion ends.
         begin(next);
         return reading();
     }
@@ -73,8 +73,7 @@ fn reading() -> u8 {
     (get(adc().adc()) >> 8) as u8
 }
 
-/// Starts to convert the sensor that is selected, and selects the one after it as soon as it is
-/// sampled.
+/// Starts to convert the selected sensor, and selects the next one as soon as the input is sampled.
 fn begin(channel: u8) {
     put(adc().adcsra(), START);
     delay_cycles(SAMPLING_CYCLES);
@@ -82,13 +81,13 @@ fn begin(channel: u8) {
     pins::select_line_sensor(if next < CHANNELS { next } else { 0 });
 }
 
-/// The IR ranger as it was behind the last line sensor.
+/// The IR ranger, converted after the last line sensor.
 pub(crate) fn read_ir() -> u16 {
     wait();
     get(adc().adc())
 }
 
-/// Until the conversion under way is over: the converter's own time bounds it.
+/// Waits until the running conversion ends, which takes only the converter's own time.
 fn wait() {
     while get(adc().adcsra()) & ADSC != 0 {}
 }

@@ -1,4 +1,4 @@
-//! The sending end of ExDe: `lager_exde::Transmitter`, driven by the timer's second compare
+//! The transmitter of ExDe: drives `lager_exde::Transmitter` by the timer's second compare
 //! interrupt.
 //!
 //! ```text
@@ -10,7 +10,7 @@ use avr_device::asm::nop;
 use lager_avr::clock;
 use lager_avr::register::{external, get, put, timer1};
 use lager_avr::shared::Shared;
-use lager_exde::{Action, Step, Transmitter};
+use lager_exde::{Step, Transmitter, WireAction};
 
 use crate::pins;
 
@@ -18,12 +18,12 @@ use crate::pins;
 const RISING: u8 = 0b11;
 const INT0_ON: u8 = 1;
 
-/// From the timer's match to where the interrupt reads the timer: it would lengthen every half bit.
+/// Time from the timer's match until the interrupt reads the timer; each wait is shorter by it.
 const INTERRUPT_TICKS: u16 = 5;
 
 static TRANSMITTER: Shared<Transmitter> = Shared::new(Transmitter::new());
 
-/// Listens for the return sync and begins to ask for it. Interrupts are still off.
+/// Listens for the return sync and begins the handshake. Interrupts are still off.
 pub(crate) fn start() {
     put(external().eicra(), RISING);
     put(external().eimsk(), INT0_ON);
@@ -33,7 +33,8 @@ pub(crate) fn start() {
     });
 }
 
-/// Begins to send a word, if the one before has left and the steering board has answered.
+/// Begins to send a word. `false`: the word before is not sent yet, or the other board never
+/// answered.
 pub(crate) fn send(word: u16) -> bool {
     TRANSMITTER.with(|transmitter| {
         let Some(step) = transmitter.start(word) else {
@@ -50,17 +51,17 @@ pub(crate) fn is_sending() -> bool {
     TRANSMITTER.with(|transmitter| transmitter.is_sending())
 }
 
-/// Sets the wires, and the timer for the next step, counted from this one.
+/// Sets the wires, and the timer for the step after this one.
 #[inline(always)]
 fn carry_out(step: Step) {
     match step.action {
-        Action::Pulse => pins::set_exde_sync(true),
-        Action::Place(level) => pins::set_exde_data(level),
-        Action::Release => {
+        WireAction::Pulse => pins::set_exde_sync(true),
+        WireAction::Place(level) => pins::set_exde_data(level),
+        WireAction::Release => {
             pins::set_exde_data(false);
             clock::wake();
         }
-        Action::Nothing => {}
+        WireAction::Nothing => {}
     }
     match step.wait_us {
         Some(wait_us) => {
@@ -69,8 +70,8 @@ fn carry_out(step: Step) {
         }
         None => clock::disarm_compare_b(),
     }
-    if step.action == Action::Pulse {
-        // Setting the timer has taken the better part of the microsecond that a pulse is long.
+    if step.action == WireAction::Pulse {
+        // A pulse is 1 us long; setting the timer has taken most of it.
         nop();
         nop();
         nop();

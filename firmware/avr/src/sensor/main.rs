@@ -11,13 +11,13 @@ mod pins;
 mod stop;
 
 use avr_device::interrupt;
-use lager_avr::shared::Place;
+use lager_avr::shared::StaticCell;
 use lager_avr::{clock, reset, uart};
 use lager_control::{SensorConfig, SensorUnit};
 
 use board::SensorPins;
 
-static UNIT: Place<SensorUnit> = Place::new();
+static UNIT: StaticCell<SensorUnit> = StaticCell::new();
 
 #[avr_device::entry]
 fn main() -> ! {
@@ -27,7 +27,7 @@ fn main() -> ! {
     uart::start();
     converter::start();
     exde::start();
-    // SAFETY: everything the interrupts use is set up and no lock is held.
+    // SAFETY: everything that the interrupts use is set up, and no lock is held.
     unsafe { interrupt::enable() };
 
     let mut board = SensorPins::new(cause);

@@ -1,4 +1,4 @@
-//! The sensor board's pin table, and nothing else knows a pin of this board (O7, P8).
+//! The sensor board's pin table. No other file knows a pin of this board (O7, P8).
 //!
 //! ```text
 //!   port   pin  name   way  use
@@ -15,7 +15,7 @@
 //!          5           out  ExDe data
 //! ```
 //!
-//! Every pin not named is an input with pull-up.
+//! Every pin that is not listed is an input with pull-up.
 
 use lager_avr::register::{bit, clear, get, port_a, port_b, port_c, port_d, put, set};
 
@@ -32,7 +32,7 @@ const RETURN: u8 = bit(2);
 const SYNC: u8 = bit(4);
 const DATA: u8 = bit(5);
 
-/// Gives every pin its way; ExDe low, the multiplexer on.
+/// Sets every pin's direction; ExDe is low and the multiplexer on.
 pub(crate) fn set_up() {
     put(port_a().porta(), !(bit(LINE_INPUT) | bit(IR_INPUT)));
     put(port_b().portb(), !(ADDRESS | ENABLE | ISP));
@@ -42,7 +42,7 @@ pub(crate) fn set_up() {
     put(port_d().ddrd(), SYNC | DATA);
 }
 
-/// Connects a line sensor to the ADC; it must settle before it is read.
+/// Connects a line sensor to the ADC; wait until it has settled before reading it.
 #[inline(always)]
 pub(crate) fn select_line_sensor(channel: u8) {
     let port = port_b();

@@ -1,4 +1,4 @@
-//! The two ways this program ends. The board moves nothing that would have to be stopped.
+//! The two ways in which this program ends. The board has no motors to stop.
 
 use avr_device::interrupt;
 use core::panic::PanicInfo;

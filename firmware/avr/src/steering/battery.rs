@@ -1,10 +1,10 @@
-//! The battery's voltage: the ADC runs by itself and the newest reading is taken when asked for.
+//! The battery's voltage: the ADC converts again and again, and a reader takes the newest reading.
 
 use lager_avr::register::{adc, bit, get, put};
 
 use crate::pins;
 
-/// On, started, again and again, clk/128: one reading every 104 us.
+/// On, started, free running, clk/128: one reading every 104 us.
 const FREE_RUNNING: u8 = bit(7) | bit(6) | bit(5) | 0b111;
 /// Reference AVCC, the upper eight bits in one register.
 const AVCC_LEFT_ADJUST: u8 = bit(6) | bit(5);

@@ -1,4 +1,4 @@
-//! What `lager-control` asks of the steering board.
+//! Implements `lager-control`'s traits of the steering board.
 
 use lager_avr::{clock, eeprom, reset, uart};
 use lager_control::{Board, Motor, SteeringBoard};
@@ -12,7 +12,7 @@ pub(crate) struct SteeringPins {
 }
 
 impl SteeringPins {
-    /// The board, set up.
+    /// The board; its hardware is set up.
     pub(crate) fn new(cause: ResetCause) -> Self {
         Self { cause }
     }

@@ -1,4 +1,4 @@
-//! The receiving end of ExDe: `lager_exde::Receiver`, driven by a pin interrupt and a timer.
+//! The receiver of ExDe: drives `lager_exde::Receiver` by a pin interrupt and a timer.
 //!
 //! ```text
 //!   INT2, sync rises --> sample data, restart the silence --> word complete --> WORDS
@@ -19,7 +19,7 @@ const INT2_ON: u8 = 1 << 2;
 
 const TIMING: Timing = Timing::STANDARD;
 
-/// The receiver, and the timer's ticks at the last pulse.
+/// The receiver, and the timer's value at the last pulse.
 struct Listener {
     receiver: Receiver,
     last: u16,
@@ -29,8 +29,8 @@ static LISTENER: Shared<Listener> = Shared::new(Listener {
     receiver: Receiver::new(),
     last: 0,
 });
-/// Words and the timer's ticks at their last bits; the main loop looks long before the ticks go
-/// round.
+/// Words and the timer's values at their last bits; the main loop reads them long before the timer
+/// wraps.
 static WORDS: Ring<(u16, u16), 4> = Ring::new((0, 0));
 
 /// Listens for sync.
@@ -39,19 +39,19 @@ pub(crate) fn start() {
     put(external().eimsk(), INT2_ON);
 }
 
-/// The oldest word not yet read, and when its last bit came.
+/// The oldest unread word, and the time of its last bit.
 pub(crate) fn word() -> Option<(u16, u32)> {
     let (word, ticks) = WORDS.pop()?;
     let ago = clock::ticks().wrapping_sub(ticks) / clock::TICKS_PER_US;
     Some((word, clock::now_us().wrapping_sub(u32::from(ago))))
 }
 
-/// Whether a word is coming in.
+/// Whether a word is half received.
 pub(crate) fn is_receiving() -> bool {
     LISTENER.with(|listener| listener.receiver.is_midway())
 }
 
-/// What the receiver has counted.
+/// The number of errors that the receiver has counted.
 pub(crate) fn errors() -> u8 {
     LISTENER.with(|listener| listener.receiver.errors())
 }

@@ -13,13 +13,13 @@ mod servos;
 mod stop;
 
 use avr_device::interrupt;
-use lager_avr::shared::Place;
+use lager_avr::shared::StaticCell;
 use lager_avr::{clock, reset, uart};
 use lager_control::{SteeringConfig, SteeringUnit};
 
 use board::SteeringPins;
 
-static UNIT: Place<SteeringUnit> = Place::new();
+static UNIT: StaticCell<SteeringUnit> = StaticCell::new();
 
 #[avr_device::entry]
 fn main() -> ! {
@@ -31,7 +31,7 @@ fn main() -> ! {
     motors::start();
     exde::start();
     battery::start();
-    // SAFETY: everything the interrupts use is set up and no lock is held.
+    // SAFETY: everything that the interrupts use is set up, and no lock is held.
     unsafe { interrupt::enable() };
 
     let mut board = SteeringPins::new(cause);

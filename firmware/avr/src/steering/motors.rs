@@ -1,8 +1,7 @@
-//! The motors' PWM: timer 2, 8 bits at 7.8 kHz, so that a new duty holds within 128 us (W1,
-//! AMB-23).
+//! The motors' PWM: timer 2 with 8 bits at 7.8 kHz, so a new duty acts within 128 us (W1, AMB-23).
 //!
-//! A fast PWM gives a pulse of one tick even at 0, so a motor that stands has its compare output
-//! disconnected and its pin is what the port says: low.
+//! A fast PWM makes a pulse of one tick even at duty 0. So a standing motor's output is
+//! disconnected from the timer, and the port holds its pin low.
 
 use avr_device::interrupt;
 use lager_avr::register::{put, timer2};
@@ -15,18 +14,18 @@ const CS_8: u8 = 0b010;
 const LEFT_CONNECTED: u8 = 0b1000_0000;
 const RIGHT_CONNECTED: u8 = 0b0010_0000;
 
-/// Starts the timer, both outputs disconnected.
+/// Starts the timer with both outputs disconnected.
 pub(crate) fn start() {
     put(timer2().tccr2a(), FAST_PWM);
     put(timer2().tccr2b(), CS_8);
 }
 
-/// Both motors off, at once.
+/// Switches both motors off at once.
 pub(crate) fn off() {
     put(timer2().tccr2a(), FAST_PWM);
 }
 
-/// Sets both drivers, never one without the other.
+/// Sets both drivers together.
 pub(crate) fn set(left: Motor, right: Motor) {
     let connected = |motor: Motor, output| if motor.duty > 0 { output } else { 0 };
     let outputs = connected(left, LEFT_CONNECTED) | connected(right, RIGHT_CONNECTED);

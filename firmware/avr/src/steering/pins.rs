@@ -1,4 +1,4 @@
-//! The steering board's pin table, and nothing else knows a pin of this board (O7, P9).
+//! The steering board's pin table. No other file knows a pin of this board (O7, P9).
 //!
 //! ```text
 //!   port   pin  name   way     use
@@ -18,7 +18,7 @@
 //!          7    OC2A   out     PWM of the left driver
 //! ```
 //!
-//! Every pin not named is an input with pull-up.
+//! Every pin that is not listed is an input with pull-up.
 
 use lager_avr::register::{bit, clear, get, port_a, port_b, port_c, port_d, put, set};
 
@@ -36,7 +36,7 @@ const SERVOS: u8 = bit(2) | bit(3);
 const RIGHT_PWM: u8 = bit(6);
 const LEFT_PWM: u8 = bit(7);
 
-/// Gives every pin its way; the motors' pins low.
+/// Sets every pin's direction; the motors' pins are low.
 pub(crate) fn set_up() {
     put(port_d().portd(), !(LEFT_PWM | RIGHT_PWM | SERVOS));
     put(port_d().ddrd(), LEFT_PWM | RIGHT_PWM);

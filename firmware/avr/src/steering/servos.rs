@@ -1,4 +1,4 @@
-//! UART 1, the servos' wire: 1 Mbit/s, half duplex, both pins on one wire (A1, A8, P10, AMB-25,
+//! UART 1 on the servos' wire: 1 Mbit/s, half duplex, both pins on one wire (A1, A8, P10, AMB-25,
 //! AMB-26).
 //!
 //! ```text
@@ -6,9 +6,9 @@
 //!   listening --------> sending, deaf ------------------------------------> listening
 //! ```
 //!
-//! While it listens the transmitter is off, so its pin floats and the servos can pull the wire;
-//! while it sends the receiver is off, so it does not hear itself. The end is TXC, not UDRE: the
-//! data register is empty two bytes too early.
+//! While the board listens its transmitter is off, so the pin floats and the servos can drive the
+//! wire. While it sends its receiver is off, so it does not hear itself. TXC marks the end and not
+//! UDRE, because the data register is empty two bytes too early.
 
 use avr_device::interrupt;
 use lager_avr::clock;
@@ -30,12 +30,12 @@ const UBRR: u16 = 1;
 const LISTENING: u8 = RXCIE | RXEN;
 const SENDING: u8 = TXCIE | UDRIE | TXEN;
 
-/// The longest instruction packet and the longest answer.
+/// Holds the longest instruction packet or the longest answer.
 const CAPACITY: usize = 64;
 
 static RECEIVED: Ring<u8, CAPACITY> = Ring::new(0);
 static TO_SEND: Ring<u8, CAPACITY> = Ring::new(0);
-/// 1 while an instruction packet is being sent.
+/// 1 while the board sends an instruction packet.
 static BUSY: SharedByte = SharedByte::new(0);
 
 /// Starts to listen. Interrupts are still off.
@@ -47,7 +47,7 @@ pub(crate) fn start() {
     put(uart.ucsr1b(), LISTENING);
 }
 
-/// Sends bytes, all or none: none while others are being sent.
+/// Sends all bytes, or none if others are still being sent.
 #[inline(never)]
 pub(crate) fn write(bytes: &[u8]) -> bool {
     if BUSY.get() != 0 || bytes.len() > usize::from(TO_SEND.room()) {
@@ -61,7 +61,7 @@ pub(crate) fn write(bytes: &[u8]) -> bool {
     true
 }
 
-/// The oldest byte a servo sent and not yet read.
+/// The oldest byte from a servo that nobody has read.
 #[inline(never)]
 pub(crate) fn read() -> Option<u8> {
     RECEIVED.pop()
@@ -69,7 +69,7 @@ pub(crate) fn read() -> Option<u8> {
 
 #[avr_device::interrupt(atmega1284p)]
 fn USART1_RX() {
-    // A byte comes every 160 cycles and three can wait, so all that are there are taken at once.
+    // A byte comes every 160 cycles and three can wait, so this takes all that are there.
     let uart = usart1();
     loop {
         RECEIVED.push(get(uart.udr1()));

@@ -1,5 +1,5 @@
-//! The two ways in which this program ends: its main loop hangs, or it panics. Either stops the
-//! motors first.
+//! The two ways in which this program ends: the main loop hangs, or the program panics. Both stop
+//! the motors first.
 
 use avr_device::interrupt;
 use core::panic::PanicInfo;

@@ -1,4 +1,4 @@
-//! Packets other people published, with where each was found. The expected values are theirs.
+//! Packets that other people published, with the sources. The expected values are theirs.
 
 /// One published packet.
 pub(crate) struct Vector {
@@ -6,15 +6,15 @@ pub(crate) struct Vector {
     pub(crate) bytes: &'static [u8],
     /// Whether a servo sent it.
     pub(crate) status: bool,
-    /// The servo's published answer, empty when none is given.
+    /// The servo's published answer; empty if there is none.
     pub(crate) reply: &'static [u8],
-    /// What it does.
+    /// The packet's effect.
     pub(crate) meaning: &'static str,
     /// Where it was published.
     pub(crate) source: &'static str,
 }
 
-/// All of them.
+/// All published packets.
 pub(crate) const VECTORS: &[Vector] = &[
     Vector {
         bytes: &[0xFF, 0xFF, 0x01, 0x05, 0x03, 0x0C, 0x64, 0xAA, 0xDC],

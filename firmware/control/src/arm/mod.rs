@@ -9,9 +9,10 @@
 //!   3 and 5 face their partners: their position is 1023 minus the partner's
 //! ```
 //!
-//! The module uses its one wire for these tasks, most urgent first: the command under way
-//! ([`program`]), bringing a servo into service, looking at one servo after the other. A servo is
-//! brought into service without moving it, so that the arm drops nothing when the board restarts:
+//! Both directions share one wire. The module uses it for these tasks, most urgent first: the
+//! command under way (`program`), bringing a servo into service, a look at the next servo (a
+//! question for its state). Bringing into service moves no servo, so a restarted board drops
+//! nothing:
 //!
 //! ```text
 //!              answers             goal = position         torque on
@@ -20,12 +21,13 @@
 //!      '-- answers ------^
 //! ```
 //!
-//! A missing servo never holds up the others: it is flagged, left out, and asked again in its turn.
+//! A missing servo never delays the others: the board flags it, leaves it out and asks it again in
+//! its turn.
 //!
-//! No command leads out of the limits of the profile: its poses lie inside by
-//! [`ArmProfile::validate`], and a step ends at a limit or is refused there. An arm that stands
-//! outside, because it was moved by hand or before the limits were sent, may only be stepped back;
-//! nothing moves it there by itself.
+//! No command moves a joint out of the limits of the profile. [`ArmProfile::validate`] checks that
+//! the poses lie inside; a step ends at a limit or is refused there. A joint can be outside if
+//! somebody moved it by hand or the limits came later. The board does not move it back by itself:
+//! only steps towards the limits are allowed.
 
 mod config;
 mod program;
@@ -37,16 +39,16 @@ use lager_ax12::ErrorBits;
 use lager_wire::{ArmCommand, ArmData, ArmLimits, ArmProfile};
 
 pub use config::ArmConfig;
-pub use program::Outcome;
+pub use program::ArmEnd;
 use servo::{Servo, Setup};
 use task::Program;
 
 use crate::SteeringBoard;
-use crate::servo_bus::{Answer, ServoBus};
+use crate::servo_bus::{ServoAnswer, ServoBus};
 use crate::time::{first, reached};
 
 /// How many servos the arm has; ids 1..=8, at index id - 1.
-pub const SERVOS: usize = 8;
+pub const SERVOS: usize = ArmData::SERVOS as usize;
 
 /// Index of the base's servo.
 pub(crate) const BASE: usize = 0;
@@ -70,7 +72,7 @@ pub(crate) const fn partner(index: usize) -> Option<usize> {
     }
 }
 
-/// Where the joint of this servo may be sent.
+/// The limits of this servo's joint.
 fn limits(profile: &ArmProfile, joint: usize) -> ArmLimits {
     let limits = &profile.limits;
     match joint {
@@ -91,14 +93,14 @@ const fn bit(index: usize) -> u8 {
     1 << index
 }
 
-/// What became of the wish to begin a command.
+/// What [`Arm::start`] did with a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// It runs.
+    /// The command runs.
     Begun,
     /// A command is under way or a servo is being brought into service; ask again.
     NotYet,
-    /// It would lead out of the joint's limits; nothing has happened.
+    /// The command would move a joint out of its limits; nothing has happened.
     Outside,
 }
 
@@ -127,21 +129,21 @@ pub struct Arm {
     program: Program,
     /// The question under way and whether the program asked it.
     asked: Option<(Job, bool)>,
-    /// Servos the program has moved or tried to.
+    /// Servos that the program has moved or tried to move.
     touched: u8,
-    /// Whether servos in service have to be told another torque limit.
+    /// Whether servos in service still have to get a new torque limit.
     torque_untold: bool,
-    /// Whether a servo the program needs has failed.
+    /// Whether a servo that the program needs has failed.
     failed: bool,
-    finished: Option<Outcome>,
-    /// Servos whose state is to be told to the Pi.
+    finished: Option<ArmEnd>,
+    /// Servos whose state the Pi has not heard yet.
     untold: u8,
     next_round: usize,
     round_due_us: u32,
 }
 
 impl Arm {
-    /// An arm nobody has looked at yet.
+    /// An arm whose servos the board has not asked yet.
     #[must_use]
     pub fn new(config: ArmConfig, now_us: u32) -> Self {
         Self {
@@ -160,13 +162,13 @@ impl Arm {
         }
     }
 
-    /// Whether a command is under way, or its end not yet fetched.
+    /// Whether a command is under way, or has ended and nobody has fetched its end.
     #[must_use]
     pub fn is_busy(&self) -> bool {
         !matches!(self.program, Program::Idle) || self.finished.is_some()
     }
 
-    /// Begins a command, if it may.
+    /// Begins a command if the arm is free and the command stays within the limits.
     pub fn start(&mut self, command: ArmCommand, now_us: u32) -> Start {
         if self.is_busy() || self.is_settling() {
             return Start::NotYet;
@@ -180,20 +182,20 @@ impl Arm {
         }
     }
 
-    /// The profile that is obeyed.
+    /// The profile in force.
     #[must_use]
     pub fn profile(&self) -> &ArmProfile {
         &self.config.profile
     }
 
-    /// Obeys another profile from now on. The caller has validated it. What moves goes on to where
-    /// it was sent; servos in service are told a new torque limit where they stand.
+    /// Puts another profile in force; the caller has validated it. A moving servo goes on to its
+    /// old goal. Servos in service get the new torque limit without being moved.
     pub fn set_profile(&mut self, profile: ArmProfile) {
         self.torque_untold |= profile.torque_limit != self.config.profile.torque_limit;
         self.config.profile = profile;
     }
 
-    /// Stops the command under way where it is. [`Arm::poll`] tells when that is done.
+    /// Stops the moving servos where they are. [`Arm::poll`] returns the end when that is done.
     pub fn abort(&mut self) {
         let mut being_written = 0;
         if let Some((job, by_program)) = &mut self.asked
@@ -205,8 +207,8 @@ impl Arm {
         self.break_off(being_written);
     }
 
-    /// Takes in what the servos sent and puts the next question. The end of a command, once.
-    pub fn poll(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Outcome> {
+    /// Takes in the servos' bytes and asks the next question. Returns the end of a command once.
+    pub fn poll(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<ArmEnd> {
         if let Some(answer) = self.bus.poll(board, now_us)
             && let Some((job, by_program)) = self.asked.take()
         {
@@ -227,7 +229,7 @@ impl Arm {
         self.finished.take()
     }
 
-    /// When [`Arm::poll`] is wanted at the latest.
+    /// The latest time at which the caller must call [`Arm::poll`] again.
     #[must_use]
     pub fn next_due_us(&self, now_us: u32) -> u32 {
         if let Some(due_us) = self.bus.next_due_us(now_us) {
@@ -244,7 +246,7 @@ impl Arm {
         }
     }
 
-    /// A servo's state that the Pi has not been told, if there is one; telling it is then done.
+    /// The next servo state that the Pi has not heard; it counts as reported from then on.
     pub fn take_report(&mut self) -> Option<ArmData> {
         let index = self.untold_index()?;
         self.untold &= !bit(index);
@@ -265,7 +267,7 @@ impl Arm {
         self.untold_index().is_some()
     }
 
-    /// Has every servo's state told again, as to a Pi that has just come.
+    /// Marks every servo's state as not reported, for a Pi that has just connected.
     pub fn tell_all(&mut self) {
         self.untold = u8::MAX;
     }
@@ -282,7 +284,7 @@ impl Arm {
         errors
     }
 
-    /// Questions that stayed without an answer, saturating.
+    /// Questions that no servo answered; stays at 255.
     #[must_use]
     pub fn timeouts(&self) -> u8 {
         self.bus.timeouts()
@@ -292,12 +294,12 @@ impl Arm {
         (0..SERVOS).find(|index| self.untold & bit(*index) != 0 && self.servos[*index].is_seen())
     }
 
-    /// Whether a servo is being brought into service, or is to be.
+    /// Whether a servo is being brought into service, or will be next.
     fn is_settling(&self) -> bool {
         self.torque_untold || self.unfinished_setup().is_some()
     }
 
-    /// Brings servos in service into service once more, which tells them the torque limit.
+    /// Sets up all servos in service again, which gives them the new torque limit.
     fn bring_in_again(&mut self) {
         for servo in &mut self.servos {
             if matches!(servo.setup, Setup::Held | Setup::Ready) {
@@ -353,13 +355,13 @@ impl Arm {
         }
     }
 
-    /// Writes an answer down; whether the servo did what it was asked.
-    fn note(&mut self, job: Job, answer: Answer) -> bool {
+    /// Stores an answer. Returns whether the servo did what the question asked.
+    fn note(&mut self, job: Job, answer: ServoAnswer) -> bool {
         const NOT_DONE: ErrorBits = ErrorBits::CHECKSUM
             .union(ErrorBits::INSTRUCTION)
             .union(ErrorBits::RANGE);
         let servo = &mut self.servos[job.index()];
-        let Answer::Status { errors, look } = answer else {
+        let ServoAnswer::Status { errors, look } = answer else {
             servo.setup = Setup::Missing;
             return false;
         };

@@ -1,4 +1,4 @@
-//! The commands of the arm while they run (K, A6).
+//! Carries out the commands of the arm, question by question (K, A6).
 //!
 //! ```text
 //!   step, Release   Move
@@ -13,8 +13,8 @@
 //!   abort:   Move --> Freeze: look where each moving servo is, make that its goal
 //! ```
 //!
-//! Every state ends: each question has a time-out, each Move a deadline, and a squeeze has no more
-//! steps than the gripper has way.
+//! Every state ends: each question has a time-out, each Move has a deadline, and a squeeze makes no
+//! more steps than the gripper can go.
 
 use lager_ax12::table;
 use lager_wire::{ArmCommand, ArmPose};
@@ -28,15 +28,15 @@ use crate::time::reached;
 
 /// How a command of the arm ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum ArmEnd {
     /// It was carried out.
     Done,
-    /// It was broken off, or a servo it needs did not do its part.
+    /// It was broken off, or a servo that it needs failed.
     Aborted,
 }
 
 impl Arm {
-    /// Whether the command runs; one that does not would lead out of the limits.
+    /// Begins the command. `false`: it would move a joint out of its limits and does not run.
     pub(super) fn begin(&mut self, command: ArmCommand, now_us: u32) -> bool {
         match command {
             ArmCommand::Left => return self.step(BASE, true, now_us),
@@ -59,7 +59,7 @@ impl Arm {
         let moving = match &self.program {
             Program::Idle | Program::Freeze(_) => return,
             Program::Move(movement) => movement.wait & (!movement.write | being_written),
-            // A squeeze is at most one small step from standing, and what it holds shall stay held.
+            // The gripper stops within one small step, and must keep what it holds.
             Program::Squeeze(_) => 0,
         };
         self.failed = true;
@@ -122,7 +122,7 @@ impl Arm {
         }
     }
 
-    /// The program's question was answered; `fine` when the servo did what it was asked.
+    /// Goes on after the program's question; `fine` says whether the servo did what it was asked.
     pub(super) fn proceed(&mut self, job: Job, fine: bool, now_us: u32) {
         match core::mem::replace(&mut self.program, Program::Idle) {
             Program::Idle => {}
@@ -136,13 +136,13 @@ impl Arm {
         self.program = Program::Idle;
         self.untold |= self.touched;
         self.finished = Some(if self.failed {
-            Outcome::Aborted
+            ArmEnd::Aborted
         } else {
-            Outcome::Done
+            ArmEnd::Done
         });
     }
 
-    /// One small step of a joint; whether there is way left.
+    /// One small step of a joint. `false`: the joint is at its limit already.
     fn step(&mut self, joint: usize, forward: bool, now_us: u32) -> bool {
         let partner = partner(joint);
         let base = match partner {
@@ -160,7 +160,7 @@ impl Arm {
             let goal = base.saturating_sub(step).max(limits.lowest);
             (base > limits.lowest, goal)
         };
-        // One that does not answer has no place; that it fails is told when it is asked.
+        // The position of a servo that does not answer is unknown; `go` reports its failure.
         if !way_left && self.servos[joint].is_ready() {
             return false;
         }
@@ -213,7 +213,7 @@ impl Arm {
         );
     }
 
-    /// Sends servos to their goals; those out of service are left out.
+    /// Sends servos to their goals, except servos out of service.
     fn go(&mut self, goals: &Goals, manner: Manner, now_us: u32) {
         let mut write = 0;
         for index in 0..SERVOS {
@@ -261,14 +261,14 @@ impl Arm {
         self.go_on(movement, now_us);
     }
 
-    /// Whether a servo that was looked at is where it should be, or will never be.
+    /// Decides whether the movement still waits for the servo that was just looked at.
     fn judge(&mut self, movement: &mut Move, index: usize) {
         let servo = &self.servos[index];
         let rests = !servo.look.moving;
         if servo.errors.intersects(GIVES_UP) {
             self.failed = true;
         } else if !rests || servo.distance() > movement.tolerance {
-            // A servo that has not yet begun to move rests too; only the second time counts.
+            // A servo also rests before it begins to move, so only the second time counts.
             let rested = movement.resting & bit(index) != 0;
             movement.resting &= !bit(index);
             if !rests {
@@ -292,8 +292,8 @@ impl Arm {
         movement.wait = 0;
     }
 
-    /// A servo that stopped short. A load bends every servo a little; only what is far off is a
-    /// failure.
+    /// Notes a servo that stopped short. Any load bends a servo a little, so only a large distance
+    /// is a failure.
     fn note_stuck(&mut self, index: usize) {
         if self.servos[index].distance() > NEAR_GOAL {
             self.servos[index].stuck = true;
@@ -329,12 +329,12 @@ impl Arm {
     }
 }
 
-/// Goals of some of the servos.
+/// Goals for some of the servos.
 #[derive(Default)]
 struct Goals([Option<u16>; SERVOS]);
 
 impl Goals {
-    /// Sets a joint's goal, its mirrored servo included.
+    /// Sets a joint's goal, and that of its mirrored servo.
     fn joint(&mut self, joint: usize, goal: u16) {
         self.0[joint] = Some(goal);
         if let Some(partner) = partner(joint) {
@@ -347,7 +347,7 @@ impl Goals {
 struct Manner {
     speed: u16,
     timeout_us: u32,
-    /// How near to its goal a resting servo has arrived.
+    /// A resting servo this near to its goal has arrived.
     tolerance: u16,
     then: Then,
 }

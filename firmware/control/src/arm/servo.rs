@@ -1,4 +1,4 @@
-//! What is known about one servo.
+//! What the board knows about one servo of the arm.
 
 use lager_ax12::ErrorBits;
 
@@ -15,20 +15,20 @@ pub(super) enum Setup {
     Ready,
 }
 
-/// A goal this near to the position is kept when a servo comes back and stepped from; one farther
-/// off is not where the servo is going.
+/// A servo that comes back keeps a goal this near to its position, and steps start from it. A goal
+/// farther off is not where the servo is going.
 pub(super) const NEAR_GOAL: u16 = 30;
 
 /// One servo.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Servo {
     pub(super) setup: Setup,
-    /// Where it is told to be.
+    /// The position that the board sent it to.
     pub(super) goal: u16,
-    /// What it said last.
+    /// Its last answer to a look.
     pub(super) look: Look,
     pub(super) errors: ErrorBits,
-    /// It did not get where it was told to.
+    /// It stopped short of its goal.
     pub(super) stuck: bool,
 }
 
@@ -46,8 +46,8 @@ impl Servo {
         self.setup == Setup::Missing || self.stuck || !self.errors.is_empty()
     }
 
-    /// It answered with its state. One that was away is brought into service again without moving
-    /// it.
+    /// The servo answered with its state. If it was missing before, it is set up again without
+    /// being moved.
     pub(super) fn seen(&mut self, look: Look) {
         let away = !self.is_seen();
         let first = self.setup == Setup::Unseen;
@@ -68,8 +68,8 @@ impl Servo {
         self.distance() <= NEAR_GOAL
     }
 
-    /// Where a relative movement starts from: the goal, so that what hangs on the arm does not make
-    /// it sag step by step; the position, when the goal is not where the servo is.
+    /// Where a step starts. From the goal, so that the arm's load does not make it sag step by
+    /// step; from the position if the goal is far from it.
     pub(super) fn base(&self) -> u16 {
         if self.is_near_goal() {
             self.goal

@@ -1,4 +1,4 @@
-//! Closing the gripper on something of unknown size (AMB-29).
+//! Closes the gripper on a thing of unknown size, step by step (AMB-29).
 //!
 //! ```text
 //!   one step closer --> pause --> look --> load reached, no movement, or closed: over
@@ -6,13 +6,13 @@
 //!         '----------- else --------'
 //! ```
 //!
-//! The goal stays where it is at the end, a little inside what is held: that is the grip. A squeeze
-//! has no more steps than the gripper has way, so it ends whatever the servo answers.
+//! At the end the goal stays a little inside the thing; that makes the grip. A squeeze makes no
+//! more steps than the gripper can go, so it ends whatever the servo answers.
 
 use super::task::{GIVES_UP, Program, Squeeze};
 use super::{Arm, GRIPPER, Job, bit};
 
-/// Steps of a squeeze without movement after which something is held (AMB-29).
+/// After this many steps without movement the gripper holds something (AMB-29).
 const STILL_STEPS: u8 = 4;
 
 impl Arm {

@@ -1,9 +1,9 @@
-//! What a command of the arm remembers while it runs. Programs and squeezes carry it out; it stands
-//! below both, so that neither needs the other.
+//! The state of a running arm command. `program` and `squeeze` both carry it out; it stands in its
+//! own file so that neither imports the other.
 
 use lager_ax12::ErrorBits;
 
-/// Errors with which a servo switches its torque off.
+/// Errors after which a servo switches its torque off by itself.
 pub(super) const GIVES_UP: ErrorBits = ErrorBits::OVERLOAD.union(ErrorBits::OVERHEATING);
 
 /// What a command is doing.
@@ -18,11 +18,11 @@ pub(super) enum Program {
 /// Servos under way to their goals.
 #[derive(Debug, Clone)]
 pub(super) struct Move {
-    /// Goals still to be written.
+    /// Servos whose goal is not written yet, as bits.
     pub(super) write: u8,
-    /// Servos not yet there.
+    /// Servos that have not arrived yet, as bits.
     pub(super) wait: u8,
-    /// Servos that stood still when last looked at.
+    /// Servos that rested at the last look, as bits.
     pub(super) resting: u8,
     pub(super) last_looked: usize,
     pub(super) speed: u16,
@@ -33,7 +33,7 @@ pub(super) struct Move {
     pub(super) then: Then,
 }
 
-/// What follows a Move.
+/// What follows when a Move has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Then {
     Nothing,
@@ -41,18 +41,18 @@ pub(super) enum Then {
     Raise,
 }
 
-/// Moving servos being stopped where they are.
+/// Stops moving servos where they are.
 #[derive(Debug, Clone)]
 pub(super) struct Freeze {
     pub(super) left: u8,
-    /// Whether the first of them was looked at and its goal set to where it is.
+    /// Whether the first of them has answered a look; its position is then its goal.
     pub(super) looked: bool,
 }
 
-/// The gripper closing.
+/// The gripper while it closes.
 #[derive(Debug, Clone)]
 pub(super) struct Squeeze {
-    /// Whether the next thing is to write a step.
+    /// Whether the next question writes a step; otherwise it is a look.
     pub(super) stepping: bool,
     pub(super) look_due_us: u32,
     pub(super) last_position: u16,

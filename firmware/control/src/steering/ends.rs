@@ -1,11 +1,11 @@
-//! How commands ended, and the order in which the Pi is told.
+//! Holds the ends of commands, in order, until the Pi has been told.
 //!
 //! ```text
 //!   done, aborted, refused --> waiting, in order --> one report each --> told
 //! ```
 //!
-//! A report has room for one end. Two ends in one step would hide the first, so each waits for its
-//! own report; the last reported one stands in every report until the next.
+//! A report has room for one end, and of two ends in one step the second would hide the first. So
+//! each end waits for its own report. The last reported end stays in every report until the next.
 
 use heapless::Deque;
 
@@ -24,7 +24,7 @@ pub(crate) struct Finish {
     pub(crate) end: End,
 }
 
-/// Ends not yet told, and the one told last.
+/// Ends that the Pi has not heard yet, and the last one that it has.
 #[derive(Debug, Clone)]
 pub(crate) struct Ends {
     waiting: Deque<Finish, 8>,
@@ -51,7 +51,7 @@ impl Ends {
         debug_assert!(stored, "room was made");
     }
 
-    /// Moves on to the next end; whether there was one.
+    /// Moves on to the next end; returns whether there was one.
     pub(crate) fn tell_next(&mut self) -> bool {
         match self.waiting.pop_front() {
             Some(finish) => {
@@ -62,7 +62,7 @@ impl Ends {
         }
     }
 
-    /// The end that stands in the report.
+    /// The end for the report.
     pub(crate) fn told(&self) -> Finish {
         self.told
     }

@@ -1,4 +1,4 @@
-//! The steering board: commands in, wheels and arm out (T1-T5).
+//! The steering board's behaviour: it takes commands, and moves wheels and arm (T1-T5).
 //!
 //! ```text
 //!            .------------------------- one step -------------------------.
@@ -9,30 +9,29 @@
 //!            '-------------------------------------------------------------'
 //! ```
 //!
-//! Rules that hold whatever comes:
+//! Rules that always hold:
 //! - The motors stand still from boot until the first valid command, while the command is too old,
 //!   while the arm moves, and while the line to follow is not reported.
 //! - The arm is locked from boot until the first standby, and while the wheels have another command
 //!   (T4).
-//! - What runs once (turns, arm commands) ends exactly once: done, aborted or refused, under its
-//!   number. Setpoints do not end; they are replaced. One does: following that has lost its words
-//!   or its tape is aborted with the failsafe's flag, and only another command turns the wheels
-//!   again.
-//! - A refused command is counted and changes nothing: what was under way goes on and is not
-//!   renewed by it.
-//! - Duties are those at 11.1 V, in orders and reports; the drivers get what gives the same
+//! - A command that runs once (turns, arm commands) ends exactly once under its number: done,
+//!   aborted or refused. A setpoint does not end; another command replaces it. Only following can
+//!   end: when its words or its tape stay away, it is aborted with the failsafe's flag, and the
+//!   wheels stand until another command comes.
+//! - A refused command is counted and changes nothing: it neither stops nor renews the running one.
+//! - Duties in orders and reports are meant for 11.1 V; the drivers get those with the same
 //!   voltage.
-//! - Of an arm command, the servos' states are told before its end is.
+//! - The board reports the servos' states before the end of the arm command that moved them.
 
 mod ends;
+mod messages;
 mod orders;
-mod telling;
 
 use ends::End;
 use lager_wire::link::BoardLink;
-use lager_wire::{ArmCommand, ArmProfile, Callsign, LineBits, LineState, ResetCause};
+use lager_wire::{ArmCommand, ArmProfile, COMMAND_AGE, Callsign, LineBits, LineState, ResetCause};
 
-use crate::arm::{Arm, ArmConfig, Outcome, Start};
+use crate::arm::{Arm, ArmConfig, ArmEnd, Start};
 use crate::failsafe::CommandAge;
 use crate::line::LineReader;
 use crate::load::Load;
@@ -44,22 +43,22 @@ use crate::supply::Supply;
 use crate::time::{first, reached};
 use crate::wheels::{Motors, STILL, Wheels};
 use crate::{Board, EEPROM_POLL_US, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
-use telling::Reports;
+use messages::Reports;
 
 /// The steering board's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SteeringConfig {
-    /// Gains until others are set, which are kept in EEPROM.
+    /// Gains until the Pi sets others, which the board keeps in EEPROM.
     pub gains: Gains,
-    /// Age of the command, in microseconds, beyond which the board stops.
+    /// The board stops when its command is older than this, in microseconds.
     pub command_age_limit_us: u32,
-    /// From one report to the next, in microseconds; longer where the UART is slower.
+    /// Time between two reports, in microseconds; longer on a slower UART.
     pub report_period_us: u32,
-    /// From one board status to the next, in microseconds.
+    /// Time between two board statuses, in microseconds.
     pub status_period_us: u32,
-    /// Age of the last line word, in microseconds, beyond which there is no line to follow.
+    /// When the last line word is older than this, in microseconds, there is no line to follow.
     pub line_age_limit_us: u32,
-    /// Silence inside a packet after which it is given up, in microseconds.
+    /// The board gives a packet up after this silence inside it, in microseconds.
     pub gap_us: u32,
     /// The arm's numbers.
     pub arm: ArmConfig,
@@ -69,7 +68,7 @@ impl Default for SteeringConfig {
     fn default() -> Self {
         Self {
             gains: Gains::default(),
-            command_age_limit_us: 150_000,
+            command_age_limit_us: COMMAND_AGE.as_micros() as u32,
             report_period_us: 5_000,
             status_period_us: 500_000,
             line_age_limit_us: 100_000,
@@ -79,17 +78,17 @@ impl Default for SteeringConfig {
     }
 }
 
-/// The longest a step may be put off, in microseconds; well inside the watchdog's 64 ms.
+/// The longest time between two steps, in microseconds; well below the watchdog's 64 ms.
 const LONGEST_SLEEP_US: u32 = 20_000;
 
-/// A step is put off so long while a word comes in, in microseconds, unless its last bit comes
-/// first.
+/// While a word comes in, the next step waits this long, in microseconds, or until the word's last
+/// bit.
 const WORD_US: u32 = 300;
-/// From one rounding of duties to the next: odd, so that all 256 come in turn, and far, so that two
-/// in a row differ.
+/// Step of `round`: odd, so that all 256 values come in turn, and large, so that two in a row
+/// differ much.
 const ROUND_STRIDE: u8 = 157;
 
-/// What the line sensors say, as far as the wheels care.
+/// The line sensors' information for the wheels.
 #[derive(Debug, Clone)]
 struct Line {
     reader: LineReader,
@@ -97,7 +96,7 @@ struct Line {
     sides: Sides,
     /// The regulator's output for the last word.
     correction: i16,
-    /// When the last word came, while it is not too old.
+    /// When the last word came; `None` if it is too old.
     fresh_since_us: Option<u32>,
 }
 
@@ -118,29 +117,29 @@ pub struct SteeringUnit {
     register: CommandRegister,
     age: CommandAge,
     refused: u8,
-    /// Whether a standby has ever come; before it the arm is locked (T4).
+    /// Whether the Pi has ever ordered standby; the arm is locked until then (T4).
     standby_seen: bool,
     line: Line,
     wheels: Wheels,
     arm: Arm,
     arm_waiting: Option<ArmOrder>,
     arm_running: Option<ArmOrder>,
-    /// The arm's profile as the Pi is telling it, not yet in force.
+    /// The profile whose values the Pi is sending; not yet in force.
     profile: [u16; ArmProfile::VALUES],
     motors: Option<Motors>,
-    /// What the drivers were given for them.
+    /// The duties that the drivers got for `motors`.
     at_pins: Option<Motors>,
-    /// How parts of a duty step are rounded now: low to down, high to up.
+    /// How fractions of a duty step are rounded now: down if low, up if high.
     round: u8,
     supply: Supply,
     reports: Reports,
     load: Load,
-    /// The gains, P and D.
+    /// The gains P and D in EEPROM.
     store: Store<2>,
 }
 
 impl SteeringUnit {
-    /// A board that has just started; the motors are off.
+    /// A board that has just started, with its motors off.
     #[must_use]
     pub fn new(board: &impl Board, config: SteeringConfig) -> Self {
         let now_us = board.now_us();
@@ -178,8 +177,8 @@ impl SteeringUnit {
         }
     }
 
-    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which
-    /// the next step is wanted at the latest. Any input wants one at once.
+    /// Takes in everything that has arrived, decides and acts. Returns the board time by which the
+    /// next step must come; any input needs a step at once.
     pub fn step<B: SteeringBoard>(&mut self, board: &mut B) -> u32 {
         let now_us = board.now_us();
         board.kick_watchdog();
@@ -198,8 +197,8 @@ impl SteeringUnit {
         self.next_due_us(now_us)
     }
 
-    /// Does what takes long; whether it could. The wheels do not wait for it: it is begun between
-    /// two words. A word, whole or broken off by silence, is over within a millisecond whatever is
+    /// Does the work that takes long, between two words, so that the wheels do not wait for it.
+    /// Returns whether it could. A word ends within a millisecond, whole or broken off, whatever is
     /// on the wire.
     fn take_time<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> bool {
         if !self.is_between_words(board, now_us) {
@@ -215,12 +214,12 @@ impl SteeringUnit {
         true
     }
 
-    /// Looks at the line: first of all, and between things that take long, so that the wheels do
-    /// not wait for them.
+    /// Reads the line and sets the wheels. It runs first in a step and again between long work, so
+    /// that the wheels do not wait.
     fn follow<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
         if let Some((state, at_us)) = self.read_words(board) {
             self.drive(board, now_us);
-            // What may be learnt can wait until the wheels have their duties.
+            // The bias is learnt only after the wheels have their duties.
             let Line {
                 sides, correction, ..
             } = &mut self.line;
@@ -232,7 +231,7 @@ impl SteeringUnit {
         }
     }
 
-    /// Whether no word is under way. One that has just come in whole is followed first.
+    /// Whether no word is half received. A word that has just come is followed first.
     fn is_between_words<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> bool {
         if board.exde_is_receiving() {
             return false;
@@ -252,15 +251,15 @@ impl SteeringUnit {
         }
     }
 
-    /// Takes in the words that have come; what the last of them showed, and when it came.
+    /// Takes in the words that have come. Returns the line's state and the time of the last one.
     fn read_words<B: SteeringBoard>(&mut self, board: &mut B) -> Option<(LineState, u32)> {
         let mut seen = None;
         while let Some((word, at_us)) = board.exde_word() {
             let bits = LineBits::new(word);
             let reading = self.line.reader.read(bits, at_us);
             let correction = self.line.pd.update(reading.error, at_us);
-            // Over a mark nothing tells where the line is, and what was last needed would bend the
-            // way by degrees: the wheels turn alike.
+            // A mark does not show where the line is, and the last correction would bend the way by
+            // degrees. So both wheels turn alike over a mark.
             let is_mark = matches!(
                 reading.state,
                 LineState::StationToLeft | LineState::StationToRight | LineState::FourWay
@@ -285,8 +284,8 @@ impl SteeringUnit {
             && let Some(order) = self.arm_running.take()
         {
             let end = match outcome {
-                Outcome::Done => End::Done,
-                Outcome::Aborted => End::Aborted,
+                ArmEnd::Done => End::Done,
+                ArmEnd::Aborted => End::Aborted,
             };
             self.end(order.seq, end, now_us);
         }
@@ -304,7 +303,7 @@ impl SteeringUnit {
         self.arm_waiting = None;
     }
 
-    /// Whether the wheels' command keeps the arm locked (T4).
+    /// Whether the wheels' command locks the arm (T4).
     fn arm_is_locked(&self) -> bool {
         !(self.standby_seen && self.wheels.is_standby())
     }

@@ -1,4 +1,4 @@
-//! What the Pi says: commands and settings, taken in, carried out or refused.
+//! Takes in the Pi's commands and settings, and carries them out or refuses them.
 //!
 //! ```text
 //!   byte --> link --> command, new --> register --> wheel: at once
@@ -41,7 +41,7 @@ impl SteeringUnit {
         }
     }
 
-    /// The Pi has just come, or come again: it is told everything.
+    /// The Pi has connected, for the first time or again: it hears everything.
     fn greet(&mut self, now_us: u32) {
         self.reports.status_wanted = true;
         self.reports.data_due_us = now_us;
@@ -88,7 +88,7 @@ impl SteeringUnit {
         self.break_off(now_us);
     }
 
-    /// Ends everything that runs once. The arm's end follows when its servos have been stopped.
+    /// Ends every command that runs once. An arm command ends later, when its servos have stopped.
     pub(super) fn break_off(&mut self, now_us: u32) {
         if let Some(seq) = self.wheels.abort_turn() {
             self.end(seq, End::Aborted, now_us);
@@ -140,7 +140,7 @@ impl SteeringUnit {
         (setting.value, SettingStatus::Accepted)
     }
 
-    /// One value of a profile that is being told.
+    /// Keeps one value of the profile that the Pi is sending; it is not in force yet.
     fn put_aside(&mut self, index: usize, value: i16) -> (i16, SettingStatus) {
         match u16::try_from(value) {
             Ok(told) => {
@@ -151,7 +151,7 @@ impl SteeringUnit {
         }
     }
 
-    /// The profile has been told; it is obeyed if it came whole and an arm can obey it.
+    /// The Pi has sent all values. Obeys the profile if it arrived whole and an arm can obey it.
     fn put_profile_in_force(&mut self, check: i16) -> (i16, SettingStatus) {
         if check == ArmProfile::check(&self.profile) && ArmProfile::is_sound(&self.profile) {
             self.arm.set_profile(ArmProfile::from_values(&self.profile));

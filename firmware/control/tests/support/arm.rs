@@ -1,10 +1,10 @@
-//! Giving arm commands and waiting for their ends.
+//! Gives arm commands and waits for their ends.
 
 use lager_wire::{ArmData, Payload, SteerFlags};
 
 use super::Bench;
 
-/// Gives a command and waits for its end; the flags of the report that tells it.
+/// Gives a command, waits for its end, and returns the flags of the report about it.
 pub fn finish(bench: &mut Bench, code: u8, limit_ms: u32) -> SteerFlags {
     let seq = bench.command(code);
     bench.run_until(limit_ms, |bench| {
@@ -16,7 +16,7 @@ pub fn finish(bench: &mut Bench, code: u8, limit_ms: u32) -> SteerFlags {
     bench.report().flags
 }
 
-/// The same, and the command has to be done.
+/// As `finish`; the command must be done.
 pub fn done(bench: &mut Bench, code: u8, limit_ms: u32) {
     let flags = finish(bench, code, limit_ms);
     assert!(
@@ -30,7 +30,7 @@ pub fn done(bench: &mut Bench, code: u8, limit_ms: u32) {
     assert!(!flags.contains(SteerFlags::BUSY));
 }
 
-/// The same, and the command has to be aborted.
+/// As `finish`; the command must be aborted.
 pub fn aborted(bench: &mut Bench, code: u8, limit_ms: u32) {
     assert!(
         finish(bench, code, limit_ms).contains(SteerFlags::ABORTED),
@@ -38,7 +38,7 @@ pub fn aborted(bench: &mut Bench, code: u8, limit_ms: u32) {
     );
 }
 
-/// The same, and the command has to be refused.
+/// Gives a command, which the board must refuse.
 pub fn refused(bench: &mut Bench, code: u8) {
     assert!(
         finish(bench, code, 100).contains(SteerFlags::REFUSED),
@@ -46,7 +46,7 @@ pub fn refused(bench: &mut Bench, code: u8) {
     );
 }
 
-/// Every servo's state the Pi was told.
+/// Every servo state that the Pi has received.
 pub fn arm_data(bench: &Bench) -> Vec<(u32, ArmData)> {
     bench.pi.all(|payload| match payload {
         Payload::ArmData(data) => Some(data),

@@ -1,9 +1,9 @@
-//! Two small test boards, a servo model and a Pi, stepped in virtual time.
+//! Test benches for both boards with a servo model and a Pi, stepped in virtual time.
 //!
-//! The boards are stepped when they asked to be and on input, as the simulator and a sleeping chip
-//! do.
+//! A board is stepped at the time that it returned and on any input, as the simulator and a
+//! sleeping chip do.
 
-// Each test file uses its part.
+// Each test file uses only a part of this.
 #![allow(dead_code, unreachable_pub, unused_imports)]
 
 pub mod arm;
@@ -19,7 +19,7 @@ pub use pi::{Pi, Uart};
 pub use sensor::SensorBench;
 use servos::Servos;
 
-/// What a bridge says first.
+/// A bridge's first command.
 const STANDBY: SteerCommand = SteerCommand { code: 1, seq: 255 };
 
 /// Pins and wires of a steering board.
@@ -30,13 +30,13 @@ pub struct SteeringPins {
     /// Every change of the motors.
     pub motor_log: Vec<(u32, (Motor, Motor))>,
     pub words: VecDeque<(u16, u32)>,
-    /// Whether a word is coming in.
+    /// Whether a word is half received.
     pub receiving: bool,
     pub exde_errors: u8,
     pub servos: Servos,
     pub kicks: usize,
     pub eeprom: [u8; EEPROM_LENGTH as usize],
-    /// What the processor adds to the clock at every step.
+    /// Every step takes the processor this long.
     pub step_us: u32,
 }
 
@@ -94,7 +94,7 @@ impl SteeringBoard for SteeringPins {
     }
 }
 
-/// A steering board on the bench: it can be sent words and commands, and time passes when told to.
+/// A steering board on the bench. The test sends it words and commands and lets time pass.
 pub struct Bench {
     pub pins: SteeringPins,
     pub unit: SteeringUnit,
@@ -110,7 +110,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// A board just switched on, the clock at `now_us`.
+    /// A board that was just switched on; its clock shows `now_us`.
     pub fn boot(now_us: u32, config: SteeringConfig, servos: Servos) -> Self {
         let pins = SteeringPins {
             now_us,
@@ -139,7 +139,7 @@ impl Bench {
         }
     }
 
-    /// A board that is up and in standby, its servos in service, the line under its middle.
+    /// A board in standby, with its servos in service and the line under its middle.
     pub fn ready() -> Self {
         Self::ready_with(SteeringConfig::default(), Servos::at([512; 8]))
     }
@@ -155,7 +155,7 @@ impl Bench {
         bench
     }
 
-    /// Gives a command a new number, sends it and keeps renewing it. Its number.
+    /// Gives a command a new number, sends it and keeps renewing it. Returns the number.
     pub fn command(&mut self, code: u8) -> u8 {
         self.seq = self.seq.wrapping_add(1);
         let command = SteerCommand {
@@ -192,12 +192,12 @@ impl Bench {
         }
     }
 
-    /// One step of the board, whatever is left for the next.
+    /// One step of the board; it may leave work for the next.
     pub fn step_once(&mut self) {
         self.due_us = self.unit.step(&mut self.pins);
     }
 
-    /// Lets time pass; the board is stepped when it wants and on input.
+    /// Lets time pass. The board is stepped at the time that it returned and on input.
     pub fn run_us(&mut self, span_us: u32) {
         let end_us = self.pins.now_us.wrapping_add(span_us);
         loop {
@@ -225,7 +225,7 @@ impl Bench {
         self.run_us(span_ms * 1_000);
     }
 
-    /// Runs until `done`, at most `limit_ms`.
+    /// Runs until `done`; fails after `limit_ms`.
     pub fn run_until(&mut self, limit_ms: u32, done: impl Fn(&Self) -> bool) {
         for _ in 0..limit_ms {
             if done(self) {
@@ -253,7 +253,7 @@ impl Bench {
         }
     }
 
-    /// A word whose last bit comes now.
+    /// Delivers a word whose last bit comes now.
     pub fn word(&mut self, bits: u16) {
         self.pins.words.push_back((bits, self.pins.now_us));
     }
@@ -267,7 +267,7 @@ impl Bench {
         self.reports().last().expect("a report").1
     }
 
-    /// The board status that the board tells next.
+    /// The board's next status.
     pub fn status(&mut self) -> BoardStatus {
         self.pi.packets.clear();
         self.run_ms(600);

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use lager_wire::link::HostTransmitter;
 use lager_wire::{Decoder, Packet, Payload, SynAck, Version};
 
-/// Microseconds of one byte at 500 000 Bd.
+/// One byte at 500 000 Bd, in microseconds.
 const BYTE_US: u32 = 20;
 
 /// A UART with a queue of 64 bytes towards the Pi.
@@ -14,7 +14,7 @@ pub struct Uart {
     pub sent: Vec<u8>,
     busy_until_us: u32,
     pub byte_us: u32,
-    /// For every packet taken: when, and how long the line was still busy with others.
+    /// For each queued packet: when, and how long the line was still busy with earlier ones.
     pub backlog: Vec<(u32, u32)>,
 }
 
@@ -47,7 +47,7 @@ impl Uart {
     }
 }
 
-/// The Pi's end: answers SYN, keeps what it hears.
+/// The Pi's end: answers SYN and keeps every packet.
 pub struct Pi {
     decoder: Decoder,
     transmitter: HostTransmitter,

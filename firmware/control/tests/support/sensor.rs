@@ -14,11 +14,11 @@ pub struct SensorPins {
     pub ir: u16,
     pub ir_reads: usize,
     pub line_reads: usize,
-    /// Whether the steering board has answered.
+    /// Whether the steering board has answered the handshake.
     pub answered: bool,
-    /// Every word begun, and when.
+    /// Every word whose sending began, and when.
     pub words: Vec<(u32, u16)>,
-    /// How long a word is under way, in microseconds.
+    /// How long a word takes to send, in microseconds.
     pub word_us: u32,
     pub kicks: usize,
     pub eeprom: [u8; EEPROM_LENGTH as usize],
@@ -107,13 +107,13 @@ impl SensorBench {
         }
     }
 
-    /// A board that is up towards both sides.
+    /// A board that is connected to the Pi and to the steering board.
     pub fn ready(config: SensorConfig) -> Self {
         let mut bench = Self::boot(u32::MAX - 40_000, config);
         bench.run_ms(10);
         bench.pins.answered = true;
-        // Not on a pass's own time, which whoever runs in whole milliseconds would meet a step
-        // late.
+        // Off the times of the passes; otherwise a test in whole milliseconds would see each pass
+        // one step late.
         bench.run_us(60_333);
         bench.pi.packets.clear();
         bench.pins.words.clear();

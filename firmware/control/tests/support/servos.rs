@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use lager_ax12::{ErrorBits, Frame, Instruction, InstructionDecoder, table};
 
-/// Until the first byte of an answer: six bytes of question and the servo's delay.
+/// Time until the first byte of an answer: six bytes of question and the servo's delay, in us.
 const ANSWER_US: u32 = 600;
-/// One byte at 1 Mbit/s.
+/// One byte at 1 Mbit/s, in microseconds.
 const BYTE_US: u32 = 10;
 
-/// One servo and what is wrong with it.
+/// One servo and its faults.
 #[derive(Clone, Debug)]
 pub struct Servo {
     pub position: f64,
@@ -20,17 +20,17 @@ pub struct Servo {
     pub load: i16,
     pub errors: ErrorBits,
     pub present: bool,
-    /// Answers to come with a wrong checksum.
+    /// So many of its next answers have a wrong checksum.
     pub spoiled: usize,
-    /// Answers to come under the id of another servo.
+    /// So many of its next answers have another servo's id.
     pub misnamed: usize,
-    /// The servo cannot get below this.
+    /// The servo cannot move below this position.
     pub stop: f64,
-    /// Load for every unit of way that is missing at the stop.
+    /// Load per position unit between its goal and the stop.
     pub stiffness: i16,
     /// The servo does not move at all.
     pub stuck: bool,
-    /// Every goal written.
+    /// Every goal that the board wrote.
     pub goals: Vec<u16>,
     pub looks: usize,
 }
@@ -46,7 +46,7 @@ pub struct Servos {
 }
 
 impl Servos {
-    /// Without torque, at these positions.
+    /// Servos without torque at these positions.
     pub fn at(positions: [u16; 8]) -> Self {
         let servos = positions
             .iter()
@@ -157,7 +157,7 @@ impl Servo {
             return;
         }
         let goal = f64::from(self.goal);
-        // One speed unit is 0.111 rpm, a position unit 0.29 degrees; 0 is as fast as can be.
+        // One speed unit is 0.111 rpm, one position unit 0.29 degrees; speed 0 is full speed.
         let speed = if self.speed == 0 {
             1_200.0
         } else {

@@ -1,4 +1,4 @@
-//! Looking into a chip, and the one thing that is done to it: letting it hang.
+//! Reads a chip's memories, and makes its program hang for tests.
 
 use core::ffi::c_int;
 
@@ -6,11 +6,11 @@ use simavr_ffi as ffi;
 
 use super::{Chip, EEPROM, FLASH, FREQUENCY};
 
-/// Where a program hangs: at the end of the flash.
+/// A hanging program loops here, at the end of the flash.
 const LOOP: usize = FLASH - 4;
-/// `cli`, in front of it.
+/// `cli`, in front of the loop.
 const CLI: [u8; 2] = [0xF8, 0x94];
-/// `rjmp .-2`
+/// `rjmp .-2`, the loop.
 const RJMP_TO_ITSELF: [u8; 2] = [0xFF, 0xCF];
 
 impl Chip {
@@ -19,14 +19,14 @@ impl Chip {
         self.peripherals.eeprom()[..count.min(EEPROM)].to_vec()
     }
 
-    /// Fills the EEPROM from its start, as a programmer does.
+    /// Writes the EEPROM from its start, as a programmer does.
     pub fn set_eeprom(&self, content: &[u8]) {
         self.peripherals.set_eeprom(0, content);
     }
 
     /// `count` bytes of RAM or registers from `address` on.
     pub fn memory(&self, address: u16, count: usize) -> Vec<u8> {
-        // SAFETY: `ramend` bounds the data space; what lies beyond is not read.
+        // SAFETY: `ramend` bounds the data space; nothing beyond it is read.
         unsafe {
             let end = usize::from((*self.avr).ramend) + 1;
             let from = usize::from(address).min(end);
@@ -40,14 +40,14 @@ impl Chip {
         u16::from_le_bytes([self.register(0x5D), self.register(0x5E)])
     }
 
-    /// Lets the main program hang: it goes on in a loop of one instruction, as by a wild pointer.
-    /// Interrupts are served: one that is under way, or a section without them, is finished
-    /// first if that takes less than a millisecond.
+    /// Makes the main program hang in a loop of one instruction, as a wild pointer does. Interrupts
+    /// still run. A handler or a section without interrupts is finished first if that takes less
+    /// than 1 ms.
     pub fn hang(&self) {
         self.enter_loop(LOOP);
     }
 
-    /// The same with interrupts off for good, as in a section without them that never ends.
+    /// Makes the program hang with interrupts off, as in a section that never turns them on again.
     pub fn hang_with_interrupts_off(&self) {
         self.enter_loop(LOOP - CLI.len());
     }
@@ -63,8 +63,8 @@ impl Chip {
         while uninterruptible() && self.cycle() < patience {
             self.run_until(self.cycle() + 1);
         }
-        // SAFETY: the place is inside the flash, whose last instructions no image of ours reaches;
-        // the chip is not running, so the program counter is between two instructions.
+        // SAFETY: `place` is inside the flash, at its end, which none of our images reaches; the
+        // chip is not running, so the program counter is between two instructions.
         unsafe {
             let place = (*self.avr).flash.add(LOOP - CLI.len());
             for (offset, byte) in CLI.into_iter().chain(RJMP_TO_ITSELF).enumerate() {

@@ -1,16 +1,16 @@
-//! Where simavr's peripherals depart from the chip, and how that is put right.
+//! Corrects simavr's peripherals where they differ from the chip.
 //!
-//! - **ADC**: simavr waits eleven times the time it has already waited; a conversion takes 24 of
-//!   the converter's clocks and the first 168. The chip: 13 and 25.
-//! - **Watchdog**: an interrupt that is not served because I is clear is raised again for ever.
-//!   The chip resets at the second time-out.
-//! - **EEPROM**: a write is over at once. The chip takes 3.4 ms, during which EEPE is set.
-//! - **Interrupts** whose flag was set before they were enabled never come. On the chip they come
-//!   at once.
-//! - **External interrupts** set their flag at a low level, which is what they are set to after a
-//!   reset. On the chip the flag of a level is always clear.
-//! - **Timers**: their compare outputs write into the PORT register, where the program's own bits
-//!   are. On the chip they only override the pin, so the two are cut apart.
+//! - **ADC**: simavr converts in 24 of the converter's clocks, and in 168 the first time: it waits
+//!   eleven times as long as it has already waited. The chip needs 13 and 25.
+//! - **Watchdog**: while interrupts are off, simavr raises its interrupt again and again. The chip
+//!   resets at the second time-out.
+//! - **EEPROM**: simavr writes in no time. The chip takes 3.4 ms and sets EEPE meanwhile.
+//! - **Interrupts** whose flag is set before they are enabled never come. On the chip they come at
+//!   once.
+//! - **External interrupts** set their flag at a low level, which is their mode after a reset. On
+//!   the chip a level never sets the flag.
+//! - **Timers** write their compare outputs into the PORT register, over the program's own bits. On
+//!   the chip they only override the pin. So the connection is cut.
 
 use core::cell::Cell;
 use core::ffi::{c_int, c_void};
@@ -39,12 +39,12 @@ const EEPROM_WRITE: u64 = FREQUENCY * 34 / 10_000;
 
 /// simavr's number for the instruction WDR.
 const WATCHDOG_RESET: u32 = u32::from_be_bytes(*b"wdtr");
-/// simavr's number for "which lines belong to this register's bits".
+/// simavr's number for the question which lines belong to a register's bits.
 const LINES_OF_PIN: u32 = u32::from_be_bytes(*b"iogr");
 
 type Ioctl = unsafe extern "C" fn(*mut ffi::avr_io_t, u32, *mut c_void) -> c_int;
 
-/// simavr's structures of the peripherals concerned.
+/// simavr's structures of the corrected peripherals.
 pub(super) struct Peripherals {
     adc: *mut ffi::avr_adc_t,
     watchdog: *mut ffi::avr_watchdog_t,
@@ -60,7 +60,7 @@ pub(super) struct Peripherals {
 impl Peripherals {
     pub(super) fn of(avr: *mut ffi::avr_t) -> Self {
         let one = |kind| {
-            // simavr's description of this chip names each.
+            // simavr's description of this chip names one of each.
             *find(avr, kind)
                 .first()
                 .expect("simavr's atmega1284p has this peripheral")
@@ -83,13 +83,13 @@ impl Peripherals {
 
     pub(super) fn eeprom(&self) -> &[u8] {
         // SAFETY: simavr allocated this many bytes for the chip's EEPROM, and nobody writes them
-        // while the slice is looked at.
+        // while the slice exists.
         unsafe { core::slice::from_raw_parts((*self.eeprom).eeprom, EEPROM) }
     }
 
     pub(super) fn set_eeprom(&self, from: usize, content: &[u8]) {
         let count = content.len().min(EEPROM.saturating_sub(from));
-        // SAFETY: as above, and `from + count` is inside.
+        // SAFETY: as above, and `from + count` is inside the EEPROM.
         unsafe {
             let place = (*self.eeprom).eeprom.add(from.min(EEPROM));
             core::ptr::copy_nonoverlapping(content.as_ptr(), place, count);
@@ -111,7 +111,7 @@ impl Chip {
             let watchdog = &raw mut (*self.peripherals.watchdog).io;
             self.peripherals.original_ioctl.set((*watchdog).ioctl);
             (*watchdog).ioctl = Some(on_watchdog_ioctl);
-            // simavr never looks at the names again.
+            // simavr never reads the names again.
             (*watchdog).irq_names = param.cast();
         }
         self.take_over(register::EECR, on_write_eecr);
@@ -121,15 +121,15 @@ impl Chip {
         }
     }
 
-    /// After each of simavr's resets.
+    /// Brings the peripherals into their state after a reset by simavr.
     pub(super) fn release_peripherals(&self) {
         let own = &self.peripherals;
         own.watchdog_life.set(own.watchdog_life.get() + 1);
         own.eeprom_life.set(own.eeprom_life.get() + 1);
         own.eeprom_busy.set(false);
         for &timer in &own.timers {
-            // SAFETY: a timer of a living chip; simavr ignores a connection that is not there,
-            // and connects them anew at each reset.
+            // SAFETY: a timer of a living chip; simavr ignores a connection that does not exist,
+            // and makes the connections again at each reset.
             unsafe {
                 for (index, compare) in (*timer).comp.iter().enumerate() {
                     let mut request: ffi::avr_ioport_getirq_t = core::mem::zeroed();
@@ -149,7 +149,7 @@ impl Chip {
         }
     }
 
-    /// simavr's watchdog raised its interrupt.
+    /// simavr's watchdog has raised its interrupt.
     pub(super) fn watchdog_fired(&self) {
         let own = &self.peripherals;
         let life = own.watchdog_life.get() + 1;
@@ -161,7 +161,7 @@ impl Chip {
         }
     }
 
-    /// A whole time-out after the interrupt was raised: if it still waits, the chip resets.
+    /// A second time-out has passed: if the interrupt still waits, the chip resets.
     pub(super) fn watchdog_again(&self, life: u32) {
         let own = &self.peripherals;
         if own.watchdog_life.get() != life {
@@ -195,7 +195,7 @@ impl Chip {
     fn write_eecr(&self, value: u8) {
         let own = &self.peripherals;
         if own.eeprom_busy.get() {
-            // Neither writes nor reads are possible meanwhile.
+            // During a write the chip can neither write nor read.
             self.write_through(register::EECR, value & !(EERE | EEPE | EEMPE));
             self.set_register(register::EECR, self.register(register::EECR) | EEPE);
             return;
@@ -211,7 +211,7 @@ impl Chip {
         }
     }
 
-    /// simavr has taken a sample's settings and wants its voltage.
+    /// simavr has started a conversion and asks for the voltage.
     fn convert(&self, channel: u8) {
         let millivolts = self
             .on_conversion
@@ -223,15 +223,15 @@ impl Chip {
         unsafe {
             let adc = self.peripherals.adc;
             ffi::avr_raise_irq((*adc).io.irq.add(usize::from(channel & 7)), millivolts);
-            // What simavr multiplies by eleven for the rest of the conversion.
+            // simavr multiplies this by eleven to get the rest of the conversion.
             (*adc).current_prescale = 1 << prescale.max(1);
         }
     }
 }
 
 unsafe extern "C" fn on_convert(_: *mut ffi::avr_irq_t, value: u32, param: *mut c_void) {
-    // The source is the topmost of simavr's packed fields.
-    // SAFETY: registered with the chip's own parameter.
+    // The channel is in the topmost of simavr's packed fields.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     unsafe { chip(param) }.convert((value >> 19) as u8);
 }
 
@@ -240,8 +240,8 @@ unsafe extern "C" fn on_watchdog_ioctl(
     ctl: u32,
     argument: *mut c_void,
 ) -> c_int {
-    // SAFETY: the watchdog's structure carries the chip's parameter in a field simavr does not
-    // use after its start; the original was in its place before.
+    // SAFETY: the watchdog's structure carries the chip's parameter in a field that simavr does not
+    // use after its start; the original function is stored.
     unsafe {
         let chip = chip((*io).irq_names.cast());
         if ctl == WATCHDOG_RESET {
@@ -255,7 +255,7 @@ unsafe extern "C" fn on_watchdog_ioctl(
 }
 
 unsafe extern "C" fn on_write_eicra(_: *mut ffi::avr_t, _: u16, value: u8, param: *mut c_void) {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     let chip = unsafe { chip(param) };
     let modes = chip.register(register::EICRA);
     let levels = (0..3).filter(|interrupt| modes >> (2 * interrupt) & 3 == 0);
@@ -270,13 +270,13 @@ unsafe extern "C" fn on_write_mask(
     value: u8,
     param: *mut c_void,
 ) {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     let chip = unsafe { chip(param) };
     chip.write_through(address as u8, value);
     chip.raise_waiting(address as u8);
 }
 
 unsafe extern "C" fn on_write_eecr(_: *mut ffi::avr_t, _: u16, value: u8, param: *mut c_void) {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     unsafe { chip(param) }.write_eecr(value);
 }

@@ -1,4 +1,4 @@
-//! simavr's calls into the USARTs: their registers' handlers and the ends of their interrupts.
+//! simavr calls these functions when the program uses a USART's registers or leaves its interrupt.
 
 use core::ffi::c_void;
 use std::rc::Rc;
@@ -9,7 +9,7 @@ use super::usarts::{UBRRH, UBRRL, UCSRA, UCSRB, UCSRC, UDR, UsartId};
 use super::{Chip, WriteHandler, chip};
 
 impl Chip {
-    /// Takes the USARTs' registers from simavr.
+    /// Replaces simavr's handlers of the USARTs' registers.
     pub(super) fn hook_serial(self: &Rc<Self>) {
         for usart in UsartId::BOTH {
             let port = self.ports.port(usart);
@@ -52,7 +52,7 @@ impl Chip {
 type ReadHandler = unsafe extern "C" fn(*mut ffi::avr_t, u16, *mut c_void) -> u8;
 
 unsafe extern "C" fn on_read_status(_: *mut ffi::avr_t, address: u16, param: *mut c_void) -> u8 {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     unsafe { chip(param) }.register(address as u8)
 }
 
@@ -62,7 +62,7 @@ unsafe extern "C" fn on_write_status(
     value: u8,
     param: *mut c_void,
 ) {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     unsafe { chip(param) }.write_status(UsartId::of(address), value);
 }
 
@@ -72,12 +72,12 @@ unsafe extern "C" fn on_write_control(
     value: u8,
     param: *mut c_void,
 ) {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     unsafe { chip(param) }.write_control(UsartId::of(address), value);
 }
 
 unsafe extern "C" fn on_read_data(_: *mut ffi::avr_t, address: u16, param: *mut c_void) -> u8 {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     unsafe { chip(param) }.read_data(UsartId::of(address))
 }
 
@@ -87,14 +87,14 @@ unsafe extern "C" fn on_write_data(
     value: u8,
     param: *mut c_void,
 ) {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     unsafe { chip(param) }.write_data(UsartId::of(address), value);
 }
 
 /// An interrupt of a USART was entered (1) or left (0).
 unsafe extern "C" fn on_running(_: *mut ffi::avr_irq_t, value: u32, param: *mut c_void) {
     if value == 0 {
-        // SAFETY: registered with the chip's own parameter.
+        // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
         let chip = unsafe { chip(param) };
         for usart in UsartId::BOTH {
             chip.sync(usart);

@@ -1,6 +1,6 @@
-//! A firmware image: what an ELF file puts into the chip's flash and EEPROM.
+//! Reads a firmware image: the contents of flash and EEPROM from an ELF file.
 //!
-//! Read here and not by simavr, which ends the process when a file is not to its liking.
+//! simavr could read it too, but it ends the process when a file is wrong.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ pub const FLASH: usize = 128 * 1024;
 /// Bytes of EEPROM of the ATmega1284P.
 pub const EEPROM: usize = 4 * 1024;
 
-/// Where the linker puts what exists in RAM only.
+/// The linker gives addresses from here on to data that exists in RAM only.
 const RAM_ORIGIN: usize = 0x80_0000;
-/// Where the linker puts EEPROM content.
+/// The linker gives addresses from here on to the EEPROM's content.
 const EEPROM_ORIGIN: usize = 0x81_0000;
 const MACHINE_AVR: u16 = 83;
 const LOAD: u32 = 1;
@@ -27,29 +27,29 @@ pub enum ImageError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The file is not a program for an AVR.
     #[error("{0} is not an ELF file for an AVR; give the ELF file of a board, not a hex file")]
     NotAvr(PathBuf),
-    /// The file ends in the middle of what it describes.
+    /// The file is shorter than its headers say.
     #[error("{0} is cut off; build the image again")]
     CutOff(PathBuf),
-    /// Something lies beyond the memory.
-    #[error("{path} wants address {address:#x}, which the ATmega1284P does not have")]
+    /// The image needs an address that the chip lacks.
+    #[error("{path} needs address {address:#x}, which the ATmega1284P does not have")]
     Beyond {
         /// The file.
         path: PathBuf,
-        /// The first byte's place.
+        /// The first byte's address.
         address: usize,
     },
     /// simavr does not know the chip.
-    #[error("this simavr knows no atmega1284p; build the emulator anew")]
+    #[error("this simavr does not know the atmega1284p; build the emulator again")]
     NoChip,
 }
 
-/// An image, ready for as many chips as are wanted.
+/// An image; one image can fill many chips.
 #[derive(Clone, Debug)]
 pub struct Image {
     pub(crate) flash: Vec<(usize, Vec<u8>)>,
@@ -70,12 +70,12 @@ impl Image {
         Self::parse(&bytes, path)
     }
 
-    /// Bytes of flash the image fills.
+    /// How many bytes of flash the image fills.
     pub fn flash_bytes(&self) -> usize {
         self.flash.iter().map(|(_, bytes)| bytes.len()).sum()
     }
 
-    /// The version of rustc that built the image, `1.96.0`; empty if the file does not tell.
+    /// The version of rustc that built the image, such as `1.96.0`; empty if the file does not say.
     pub fn rustc(&self) -> &str {
         &self.rustc
     }
@@ -129,12 +129,12 @@ impl Image {
                 address,
             });
         }
-        // No programmer writes RAM; fuses, lock bits and signature are its own business.
+        // A programmer does not write RAM; fuses, lock bits and signature need other commands.
         Ok(())
     }
 }
 
-/// What the compiler has written into the file's comments: `rustc version 1.96.0 (...)`.
+/// Finds the compiler's version in the file's comments: `rustc version 1.96.0 (...)`.
 fn compiler(bytes: &[u8]) -> String {
     const MARK: &[u8] = b"rustc version ";
     let Some(at) = bytes.windows(MARK.len()).position(|window| window == MARK) else {

@@ -1,7 +1,7 @@
-//! What interrupts cost: how often, how long, how late, per vector and together.
+//! Measures interrupts: how often, how long and how late they run, per vector and together.
 //!
-//! Lateness is counted from the cycle in which an enabled interrupt's flag rises to the cycle in
-//! which the first instruction at its vector runs.
+//! An interrupt's lateness is the time from the cycle in which its flag rises (while it is enabled)
+//! to the cycle of the first instruction at its vector.
 
 use core::cell::RefCell;
 use core::ffi::c_void;
@@ -14,7 +14,7 @@ use super::{Chip, chip};
 /// Vectors of the ATmega1284P, reset included.
 const VECTORS: usize = 35;
 
-/// One vector's numbers, in cycles.
+/// The figures of one vector, in cycles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct VectorStatistics {
     /// The vector's number; 0 is the reset.
@@ -23,16 +23,16 @@ pub struct VectorStatistics {
     pub count: u64,
     /// The longest time from its flag to its first instruction.
     pub worst_latency: u64,
-    /// The longest time from its acceptance to its end.
+    /// The longest time from the core's acceptance to the end.
     pub longest: u64,
-    /// The sum of those times.
+    /// The sum of all times from acceptance to end.
     pub total: u64,
 }
 
-/// All interrupts since power came on, or since the numbers were cleared.
+/// The figures of all interrupts since power came on, or since they were cleared.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct InterruptStatistics {
-    /// Cycles looked at.
+    /// Cycles measured.
     pub cycles: u64,
     /// Cycles spent in interrupts, from acceptance to end.
     pub in_interrupts: u64,
@@ -49,7 +49,7 @@ impl InterruptStatistics {
     }
 }
 
-/// A stack of entered interrupts is never deeper than there are vectors.
+/// Entered interrupts nest at most as deep as there are vectors.
 #[derive(Clone, Debug)]
 struct State {
     since: u64,
@@ -71,7 +71,7 @@ impl Default for State {
     }
 }
 
-/// The numbers as they grow.
+/// The figures, while they are collected.
 #[derive(Debug, Default)]
 pub(super) struct Interrupts(RefCell<State>);
 
@@ -82,7 +82,7 @@ impl Interrupts {
         }
     }
 
-    /// An interrupt was taken back before it was entered.
+    /// An interrupt was taken back before the core entered it.
     pub(super) fn dropped(&self, vector: u8) {
         if let Some(place) = self.0.borrow_mut().raised.get_mut(usize::from(vector)) {
             *place = None;
@@ -102,7 +102,7 @@ impl Interrupts {
         state.entered.push((vector, from));
     }
 
-    /// Interrupts were left until only `depth` are entered.
+    /// The program left interrupts, so that only `depth` are still entered.
     pub(super) fn left(&self, depth: u8, cycle: u64) {
         let mut state = self.0.borrow_mut();
         while state.entered.len() > usize::from(depth) {
@@ -119,7 +119,7 @@ impl Interrupts {
         }
     }
 
-    /// The chip was reset: what was raised or entered is over.
+    /// The chip was reset: no interrupt is raised or entered any more.
     pub(super) fn forget(&self, cycle: u64) {
         self.left(0, cycle);
         self.0.borrow_mut().raised = [None; VECTORS];
@@ -154,7 +154,7 @@ impl Interrupts {
 }
 
 impl Chip {
-    /// Makes simavr tell when flags of enabled interrupts rise.
+    /// Makes simavr report when the flag of an enabled interrupt rises.
     pub(super) fn hook_interrupts(self: &Rc<Self>) {
         // SAFETY: the table names the vectors of a living chip; the callback has simavr's
         // signature, and the chip outlives its simavr half.
@@ -196,12 +196,12 @@ impl Chip {
         })
     }
 
-    /// Raises the interrupts whose flags were set before a write to `address` enabled them. The
-    /// chip does; simavr raises only when a flag rises.
+    /// Raises the interrupts that a write to `address` enabled although their flags were set
+    /// before. The chip does that; simavr raises an interrupt only when its flag rises.
     pub(super) fn raise_waiting(&self, address: u8) {
         for vector in self.vectors() {
-            // SAFETY: the table names the vectors of a living chip; raising one that is pending
-            // does nothing.
+            // SAFETY: the table names the vectors of a living chip; raising a pending one does
+            // nothing.
             unsafe {
                 let (enable, raised) = ((*vector).enable, (*vector).raised);
                 let concerned = enable.reg() as u8 == address && raised.reg() != 0;

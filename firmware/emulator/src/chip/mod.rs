@@ -1,4 +1,4 @@
-//! One ATmega1284P: simavr's core and timers, with what it does otherwise than the chip put right.
+//! One ATmega1284P: simavr's core and timers, corrected where simavr differs from the chip.
 //!
 //! ```text
 //!   simavr                               here
@@ -16,8 +16,9 @@
 //!     is set does nothing
 //! ```
 //!
-//! A chip is driven from outside by [`Chip::run_until`]; it never waits and reads no clock. Its
-//! cycle count begins with power and never goes back, resets included.
+//! A caller drives a chip by [`Chip::run_until`]; the chip never waits and reads no clock. Its
+//! cycle count begins when power comes on and never goes back, not even at a reset. In the SAFETY
+//! comments, a living chip is a [`Chip`] that has not been dropped.
 #![allow(unsafe_code)] // simavr is C; every block says why it is sound.
 
 mod access;
@@ -64,13 +65,13 @@ pub enum ResetLine {
     BrownOut,
 }
 
-/// Registers of the ATmega1284P in the data space that this crate looks at.
+/// Addresses of the ATmega1284P's registers that this crate uses, in the data space.
 pub(crate) mod register {
     pub(crate) const DDRC: u8 = 0x27;
     pub(crate) const PORTC: u8 = 0x28;
     pub(crate) const DDRD: u8 = 0x2A;
     pub(crate) const PORTD: u8 = 0x2B;
-    /// EIMSK, PCICR and TIMSK0 to TIMSK3: which interrupts are on.
+    /// EIMSK, PCICR and TIMSK0 to TIMSK3, which enable interrupts.
     pub(crate) const MASKS: [u8; 6] = [0x3D, 0x68, 0x6E, 0x6F, 0x70, 0x71];
     pub(crate) const EIFR: u8 = 0x3C;
     pub(crate) const EICRA: u8 = 0x69;
@@ -84,22 +85,22 @@ pub(crate) mod register {
     pub(crate) const OCR2B: u8 = 0xB4;
 }
 
-/// A write of the program to a register that somebody watches.
+/// Called after the program wrote to a watched register, with the cycle.
 type OnWrite = Box<dyn Fn(u64)>;
-/// A conversion: the ADC's channel and the cycle; the answer is the input in millivolts.
+/// Called for a conversion with the ADC's channel and the cycle; returns the input in millivolts.
 type OnConversion = Box<dyn Fn(u8, u64) -> u32>;
-/// An alarm set with [`Chip::alarm`]: its tag and the cycle.
+/// Called for an alarm of [`Chip::alarm`] with its tag and the cycle.
 type OnAlarm = Box<dyn Fn(u32, u64)>;
 
-/// The handler of a register that was there before ours.
+/// A register's handler of simavr, which ours has replaced.
 struct Original {
     address: u8,
     write: ffi::avr_io_write_t,
     param: *mut c_void,
 }
 
-/// One chip. Everything in it is single-threaded and reached by shared references, because
-/// simavr calls back in the middle of running.
+/// One chip. It is single-threaded, and everything in it is reached by shared references, because
+/// simavr calls back while it runs.
 pub struct Chip {
     avr: *mut ffi::avr_t,
     peripherals: Peripherals,
@@ -123,7 +124,7 @@ pub struct Chip {
 }
 
 unsafe extern "C" {
-    /// simavr's core: one instruction, or as many as fit before the next timer. Its header is
+    /// simavr's core: runs one instruction, or as many as fit before the next timer. Its header is
     /// private, the function is not.
     fn avr_run_one(avr: *mut ffi::avr_t) -> u32;
     /// The allocator of simavr's own structures.
@@ -131,9 +132,9 @@ unsafe extern "C" {
 }
 
 impl Chip {
-    /// A chip with `image` in its flash, power coming on at cycle 0 and the program starting
-    /// `delay` cycles after the usual start-up time. `noise` fills its RAM, which holds anything
-    /// after power-on.
+    /// A chip with `image` in its flash. Power comes on at cycle 0; the program starts `delay`
+    /// cycles after the usual start-up time. `noise` fills its RAM, which has random content after
+    /// power-on.
     ///
     /// # Errors
     /// simavr was built without this chip.
@@ -185,11 +186,11 @@ impl Chip {
 
     /// Cycles since power came on.
     pub fn cycle(&self) -> u64 {
-        // SAFETY: `avr` lives as long as the chip; a plain field.
+        // SAFETY: a plain field; `avr` lives as long as the chip.
         unsafe { (*self.avr).cycle }
     }
 
-    /// The level of the data space at `address`, without the side effects of a read.
+    /// The value of the data space at `address`, without the side effects of a read.
     pub fn register(&self, address: u8) -> u8 {
         // SAFETY: the data space is larger than 256 bytes.
         unsafe { *(*self.avr).data.add(usize::from(address)) }
@@ -200,12 +201,12 @@ impl Chip {
         self.resets.get()
     }
 
-    /// How often the core met something that is no instruction and stood still until its reset.
+    /// How often the core met an invalid instruction and stood still until its reset.
     pub fn crashes(&self) -> u64 {
         self.crashes.get()
     }
 
-    /// Whether the chip is held in reset or starting up.
+    /// Whether the chip is in reset or starting up.
     pub fn is_held(&self) -> bool {
         self.held_until.get().is_some()
     }
@@ -215,12 +216,12 @@ impl Chip {
         self.slept.get()
     }
 
-    /// Interrupts so far: how often, how long, how late.
+    /// The interrupts so far: how often, how long, how late.
     pub fn interrupts(&self) -> InterruptStatistics {
         self.interrupts.statistics(self.cycle())
     }
 
-    /// Starts the interrupts' statistics anew.
+    /// Sets the interrupts' statistics to zero.
     pub fn clear_interrupts(&self) {
         self.interrupts.clear(self.cycle());
     }
@@ -235,24 +236,25 @@ impl Chip {
         }
     }
 
-    /// Who tells the voltage at an ADC channel, in millivolts.
+    /// Sets the function that gives the voltage at an ADC channel, in millivolts.
     pub fn on_conversion(&self, action: impl Fn(u8, u64) -> u32 + 'static) {
         *self.on_conversion.borrow_mut() = Some(Box::new(action));
     }
 
-    /// Who is called by alarms.
+    /// Sets the receiver of alarms.
     pub fn on_alarm(&self, action: impl Fn(u32, u64) + 'static) {
         *self.on_alarm.borrow_mut() = Some(Box::new(action));
     }
 
-    /// Calls back with `tag` at a cycle, or at once when that is over. Alarms survive resets.
+    /// Sets an alarm: the receiver gets `tag` at this cycle, or at once if it is past. Alarms
+    /// survive resets.
     pub fn alarm(&self, at: u64, tag: u32) {
         self.schedule(at, queue::Event::Alarm { tag });
     }
 
     fn fill(&self, image: &Image, noise: u64) {
-        // SAFETY: an image's pieces lie inside the flash, and `avr_loadcode` copies them; the
-        // data space has `ramend` + 1 bytes.
+        // SAFETY: an image's pieces lie inside the flash, and `avr_loadcode` copies them; the data
+        // space has `ramend` + 1 bytes.
         unsafe {
             for (address, bytes) in &image.flash {
                 let mut bytes = bytes.clone();
@@ -277,14 +279,14 @@ impl Chip {
         }
     }
 
-    /// Puts `handler` in place of a register's write handler and remembers that.
+    /// Puts `handler` in place of a register's write handler, and keeps the original.
     fn take_over(self: &Rc<Self>, address: u8, handler: WriteHandler) {
         let taken = |original: &Original| original.address == address;
         if self.originals.borrow().iter().any(taken) {
             return;
         }
-        // SAFETY: the address is that of an I/O register; the table has a place for each. The
-        // chip outlives its simavr half, so the pointer stays good.
+        // SAFETY: the address is that of an I/O register; the table has an entry for each. The chip
+        // outlives its simavr half, so the pointer stays valid.
         unsafe {
             let place = &raw mut (*self.avr).io[usize::from(address) - 32].w;
             self.originals.borrow_mut().push(Original {
@@ -297,7 +299,7 @@ impl Chip {
         }
     }
 
-    /// Lets simavr do what it would have done on a write.
+    /// Handles a write as simavr itself does.
     fn write_through(&self, address: u8, value: u8) {
         let original = self
             .originals
@@ -320,14 +322,14 @@ impl Chip {
         unsafe { *(*self.avr).data.add(usize::from(address)) = value };
     }
 
-    /// Tells whoever watches registers that one may have changed.
+    /// Calls the watcher of registers, because one may have changed.
     fn tell_watcher(&self) {
         if let Some(action) = self.on_write.borrow().as_ref() {
             action(self.cycle());
         }
     }
 
-    /// What simavr hands back to our callbacks.
+    /// The parameter that simavr passes to our callbacks.
     fn param(self: &Rc<Self>) -> *mut c_void {
         Rc::as_ptr(self).cast_mut().cast()
     }
@@ -335,8 +337,8 @@ impl Chip {
 
 impl Drop for Chip {
     fn drop(&mut self) {
-        // SAFETY: nobody runs the chip any more; simavr frees what it allocated in it, then the
-        // chip itself and the reset hook, which was made by `Box::into_raw`.
+        // SAFETY: nobody runs the chip any more; simavr frees its own memory in it, then the chip
+        // itself and the reset hook, which was made by `Box::into_raw`.
         unsafe {
             ffi::avr_terminate(self.avr);
             let hook = self.reset_hook.get();
@@ -354,20 +356,20 @@ type WriteHandler = unsafe extern "C" fn(*mut ffi::avr_t, u16, u8, *mut c_void);
 /// The chip behind a callback's parameter.
 ///
 /// # Safety
-/// `param` is what [`Chip::param`] gave, and the chip still lives.
+/// `param` comes from [`Chip::param`], and the chip still lives.
 unsafe fn chip<'chip>(param: *mut c_void) -> &'chip Chip {
     // SAFETY: by this function's contract; only shared references to a chip exist.
     unsafe { &*param.cast_const().cast() }
 }
 
 unsafe extern "C" fn on_watched(_: *mut ffi::avr_t, address: u16, value: u8, param: *mut c_void) {
-    // SAFETY: registered with the chip's own parameter.
+    // SAFETY: the callback was registered with `Chip::param`, and the chip still lives.
     let chip = unsafe { chip(param) };
     chip.write_through(address as u8, value);
     chip.tell_watcher();
 }
 
-/// simavr writes to stdout and stderr; what it has to say is found out in other ways.
+/// Silences simavr, which writes to stdout and stderr; this crate notices its errors otherwise.
 fn silence() {
     unsafe extern "C" fn quiet(
         _: *mut ffi::avr_t,

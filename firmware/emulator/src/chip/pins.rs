@@ -1,10 +1,10 @@
-//! Pins, and wires from a pin of one chip to a pin of another, by simavr's own IRQ connections.
+//! Pins, and wires from a pin of one chip to a pin of another, made of simavr's IRQ connections.
 //!
 //! ```text
 //!   driving chip's pin --notify: the other chip catches up, edges are counted, faults--.
 //!                      '--connected IRQ--> other chip's pin: INTx, PIN register <------'
 //! ```
-//! A chip in reset drives nothing; a wire it drives then reads low, by the receiver's pull-down.
+//! A chip in reset drives nothing; its wires then read low, because the receivers pull them down.
 
 use core::cell::{Cell, RefCell};
 use core::ffi::c_void;
@@ -14,7 +14,7 @@ use simavr_ffi as ffi;
 
 use super::Chip;
 
-/// A pin's place on the chip.
+/// A pin of the chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pin {
     /// The port's letter, 'A' to 'D'.
@@ -23,7 +23,7 @@ pub struct Pin {
     pub bit: u8,
 }
 
-/// What stands on a pin, seen from outside.
+/// The level of a pin as seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// Not driven by the chip; its pull-up does not count.
@@ -35,7 +35,7 @@ pub enum Level {
 }
 
 impl Pin {
-    /// A pin by its data sheet name, as `Pin::new('D', 5)` for PD5.
+    /// A pin by its datasheet name, as `Pin::new('D', 5)` for PD5.
     pub const fn new(port: char, bit: u8) -> Self {
         Self { port, bit }
     }
@@ -45,7 +45,7 @@ impl Pin {
         0x20 + 3 * (self.port as u8 - b'A')
     }
 
-    /// What the chip does with the pin. PWM outputs are not told here.
+    /// How the chip drives the pin, without its PWM output.
     pub fn level(self, chip: &Chip) -> Level {
         let bit = |offset| chip.register(self.base() + offset) >> self.bit & 1 == 1;
         match (bit(1), bit(2)) {
@@ -57,12 +57,12 @@ impl Pin {
 
     fn irq(self, chip: &Chip) -> *mut ffi::avr_irq_t {
         let request = u32::from_be_bytes([b'i', b'o', b'g', self.port as u8]);
-        // SAFETY: the chip lives; simavr gives null for what it does not know.
+        // SAFETY: the chip lives; simavr returns null for a pin that it does not know.
         unsafe { ffi::avr_io_getirq(chip.avr, request, i32::from(self.bit)) }
     }
 }
 
-/// A wire, as faults and tests see it.
+/// A wire; tests use it to lose pulses and to record edges.
 pub struct Wire {
     to: Weak<Chip>,
     from: Weak<Chip>,
@@ -83,33 +83,33 @@ pub(super) struct Wires {
 }
 
 impl Wire {
-    /// Rises so far, lost ones included.
+    /// How often the wire rose, lost pulses included.
     pub fn rises(&self) -> u64 {
         self.rises.get()
     }
 
-    /// Rises that were lost.
+    /// How many of these pulses were lost.
     pub fn lost(&self) -> u64 {
         self.lost.get()
     }
 
-    /// Lets the next `count` pulses get lost on the way.
+    /// Loses the next `count` pulses.
     pub fn lose(&self, count: u64) {
         self.lose.set(count);
     }
 
-    /// From now on remembers every edge with its cycle.
+    /// Records every edge with its cycle from now on.
     pub fn record(&self) {
         *self.edges.borrow_mut() = Some(Vec::new());
     }
 
-    /// The edges remembered since the last call.
+    /// The edges recorded since the last call.
     pub fn take_edges(&self) -> Vec<(u64, bool)> {
         let mut edges = self.edges.borrow_mut();
         edges.as_mut().map(core::mem::take).unwrap_or_default()
     }
 
-    /// The level is about to change; whether it gets through.
+    /// Notes a change of the level. Returns whether it reaches the other chip.
     fn passes(&self, high: bool) -> bool {
         let (Some(from), Some(to)) = (self.from.upgrade(), self.to.upgrade()) else {
             return false;
@@ -145,7 +145,7 @@ pub fn wire(from: &Rc<Chip>, source: Pin, to: &Rc<Chip>, target: Pin) -> Rc<Wire
         lost: Cell::new(0),
         edges: RefCell::new(None),
     });
-    // SAFETY: both lines belong to living chips. The wire is kept by both, so it lives as long as
+    // SAFETY: both lines belong to living chips. Both chips keep the wire, so it lives as long as
     // either can call back.
     unsafe {
         let param = Rc::as_ptr(&wire).cast_mut().cast();
@@ -157,7 +157,7 @@ pub fn wire(from: &Rc<Chip>, source: Pin, to: &Rc<Chip>, target: Pin) -> Rc<Wire
     wire
 }
 
-/// A chip in reset lets go of its outputs.
+/// A chip in reset stops driving its outputs.
 pub(super) fn release(wires: &Wires) {
     for wire in &wires.driven {
         // SAFETY: the line belongs to a living chip.
@@ -165,7 +165,7 @@ pub(super) fn release(wires: &Wires) {
     }
 }
 
-/// A chip that starts sees the levels that stand on its inputs.
+/// A chip that starts sees the levels on its inputs.
 pub(super) fn refresh(wires: &Wires) {
     for wire in &wires.driving {
         if wire.from.upgrade().is_some() {
@@ -176,11 +176,11 @@ pub(super) fn refresh(wires: &Wires) {
 }
 
 unsafe extern "C" fn on_edge(irq: *mut ffi::avr_irq_t, value: u32, param: *mut c_void) {
-    // SAFETY: the parameter is a wire that both its chips keep; simavr asks us before it follows
-    // the connection, and stops there when the flag is set.
+    // SAFETY: the parameter is a wire that both its chips keep; simavr calls us before it follows
+    // the connection, and does not follow it when the flag is set.
     unsafe {
         let wire: &Wire = &*param.cast_const().cast();
-        // simavr's own note of the level is lost at a reset.
+        // simavr forgets the level that it stored itself at a reset.
         let high = value & 1 == 1;
         if wire.level.get() != high && !wire.passes(high) {
             (*irq).flags |= ffi::IRQ_FLAG_NTF_STOP as u8;

@@ -1,7 +1,7 @@
-//! What happens to a chip from outside, or by peripherals of ours, at known cycles.
+//! A chip's future events: those from outside and those of this crate's peripherals.
 //!
-//! Apart from simavr's timers, because those are forgotten at a reset and a byte under way on a
-//! cable is not.
+//! They are not simavr's timers, because simavr forgets its timers at a reset, and a byte on a
+//! cable arrives in spite of the reset.
 
 use core::cell::{Cell, RefCell};
 use core::cmp::Reverse;
@@ -9,7 +9,7 @@ use std::collections::BinaryHeap;
 
 use super::usarts::UsartId;
 
-/// One thing to happen. `life` makes an event of a peripheral void when that was reset meanwhile.
+/// One event. An event of a peripheral is void if that was reset since; then `life` differs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Event {
     /// A frame has left.
@@ -22,7 +22,7 @@ pub(super) enum Event {
     WatchdogAgain { life: u32 },
     /// The EEPROM has written its byte.
     EepromDone { life: u32 },
-    /// Somebody outside asked to be called.
+    /// An alarm that somebody outside has set.
     Alarm { tag: u32 },
 }
 
@@ -47,7 +47,7 @@ impl PartialOrd for Entry {
     }
 }
 
-/// Events in the order of their cycles, and of their making within one.
+/// Events in the order of their cycles; events of one cycle in the order in which they were made.
 #[derive(Debug)]
 pub(super) struct Queue {
     entries: RefCell<BinaryHeap<Reverse<Entry>>>,

@@ -1,4 +1,4 @@
-//! Running a chip: instructions, sleep, interrupts' entry, resets.
+//! Runs a chip: instructions, sleep, entry of interrupts, resets.
 //!
 //! ```text
 //!            horizon reached
@@ -7,8 +7,8 @@
 //!   |  own events due --> simavr's timers due --> asleep: the clock jumps to the next of both
 //!   '--- an interrupt is entered, or instructions run up to the next event <--' awake
 //! ```
-//! Nothing here waits: simavr's own loop calls `usleep` when the program sleeps, and counts one
-//! cycle too many doing so.
+//! simavr's own loop is not used: it calls `usleep` when the program sleeps, and then counts one
+//! cycle too many. Nothing here waits.
 
 use core::ffi::c_int;
 
@@ -18,17 +18,17 @@ use super::pins;
 use super::queue::Event;
 use super::{Chip, FREQUENCY, ResetLine, avr_run_one, chip, register};
 
-/// From a reset's cause to the first instruction: 65 ms and 14 cycles, the fuses for a crystal
-/// and slowly rising power.
+/// Time from a reset's cause to the first instruction: 65 ms and 14 cycles, as the fuses say (a
+/// crystal, slowly rising power).
 const START_UP: u64 = FREQUENCY * 65 / 1_000 + 14;
-/// Cycles from an interrupt's acceptance to the first instruction at its vector: the program
-/// counter of two bytes is pushed (datasheet, interrupt response time).
+/// Cycles from an interrupt's acceptance to the first instruction at its vector: the core pushes
+/// the two bytes of the program counter (datasheet, interrupt response time).
 const ENTRY: u64 = 4;
-/// And as many more when the core slept.
+/// Additional cycles if the core slept.
 const ENTRY_FROM_SLEEP: u64 = 4;
 
 impl Chip {
-    /// Runs until the cycle count is at least `horizon`; it passes it by one instruction at most.
+    /// Runs until the cycle count is at least `horizon`, and at most one instruction further.
     pub fn run_until(&self, horizon: u64) {
         if self.running.replace(true) {
             return;
@@ -39,15 +39,14 @@ impl Chip {
         self.running.set(false);
     }
 
-    /// Brings a chip that lags up to `cycle`. One that is running is not touched.
+    /// Runs a chip that lags up to `cycle`. A chip that is running already goes on by itself.
     pub(crate) fn catch_up(&self, cycle: u64) {
         if self.cycle() < cycle {
             self.run_until(cycle);
         }
     }
 
-    /// The cycle at which the chip does something by itself next: now, unless it sleeps or is
-    /// held in reset.
+    /// The cycle of the chip's next action of its own: now, unless it sleeps or is in reset.
     pub fn next_action(&self) -> u64 {
         let now = self.cycle();
         if let Some(until) = self.held_until.get() {
@@ -68,7 +67,7 @@ impl Chip {
         timer.min(self.queue.next()).max(now)
     }
 
-    /// Resets the chip now, as by its pin, its supply or power.
+    /// Resets the chip now, by its reset pin, its supply or power.
     pub fn reset(&self, line: ResetLine) {
         let flag = match line {
             ResetLine::Power => 0x01,
@@ -78,7 +77,7 @@ impl Chip {
         self.reset_with(flag);
     }
 
-    /// Resets the chip with a flag in MCUSR.
+    /// Resets the chip and sets this flag in MCUSR.
     pub(super) fn reset_with(&self, flag: u8) {
         self.set_register(register::MCUSR, self.register(register::MCUSR) | flag);
         self.reset_core();
@@ -86,13 +85,13 @@ impl Chip {
         self.begin_reset(0);
     }
 
-    /// Makes simavr tell us of resets, its own included.
+    /// Makes simavr report every reset, also its own.
     pub(super) fn hook_reset(self: &std::rc::Rc<Self>) {
         // SAFETY: zero is a valid value of every field of this C structure.
         let mut hook: Box<ffi::avr_io_t> = Box::new(unsafe { core::mem::zeroed() });
         hook.kind = c"emulator".as_ptr();
         hook.reset = Some(on_reset);
-        // simavr never looks at this field of ours.
+        // simavr never reads this field of our hook.
         hook.irq_names = self.param().cast();
         let hook = Box::into_raw(hook);
         self.reset_hook.set(hook);
@@ -100,10 +99,10 @@ impl Chip {
         unsafe { ffi::avr_register_io(self.avr, hook) };
     }
 
-    /// Everything an event means.
+    /// Puts an event into the queue.
     pub(super) fn schedule(&self, at: u64, event: Event) {
         self.queue.push(at, event);
-        // A program that runs must not pass the event.
+        // A running program must stop at the event.
         let ahead = at.saturating_sub(self.cycle());
         // SAFETY: plain fields of a living chip.
         unsafe {
@@ -112,8 +111,7 @@ impl Chip {
         }
     }
 
-    /// The lines of a chip that has just been reset, until its program starts `delay` cycles
-    /// after the usual time.
+    /// Resets the lines of the chip. Its program starts `delay` cycles after the usual time.
     pub(super) fn begin_reset(&self, delay: u64) {
         self.held_until.set(Some(self.cycle() + START_UP + delay));
         self.asleep.set(false);
@@ -138,28 +136,28 @@ impl Chip {
             }
             return;
         }
-        // The limit of one makes the core come back after any instruction that sets a timer:
-        // simavr would otherwise count the whole span again from there.
+        // A limit of one makes the core return after any instruction that sets a timer; otherwise
+        // simavr would count the whole span again from there.
         // SAFETY: the chip lives, and no reference into it is held across the call.
         let to_timer = unsafe {
             (*self.avr).run_cycle_limit = 1;
             ffi::avr_cycle_timer_process(self.avr)
         };
         if let Some(at) = self.reset_seen.take() {
-            // simavr's watchdog resets by itself and begins to count at 0.
+            // simavr's watchdog resets by itself and starts the cycle count at 0.
             self.set_cycle(at);
             self.resets.set(self.resets.get() + 1);
             self.begin_reset(0);
             return;
         }
-        // A timer may have set an event of ours.
+        // A timer may have put an event into our queue.
         let limit = horizon.min(self.queue.next());
         if self.core_state() == ffi::cpu_Running as c_int {
             if !self.enter_interrupt() {
                 self.run_instructions(to_timer.min(limit.saturating_sub(now)));
             }
         } else {
-            // Asleep, or crashed: only time passes, and the watchdog's is part of it.
+            // Asleep or crashed: only time passes, also for the watchdog.
             let next = now + to_timer.max(1);
             let then = next.min(limit).max(now);
             self.set_cycle(then);
@@ -169,9 +167,9 @@ impl Chip {
         }
     }
 
-    /// Lets simavr enter an interrupt that is due; whether it did.
+    /// Lets simavr enter a due interrupt; returns whether it did.
     fn enter_interrupt(&self) -> bool {
-        // SAFETY: plain fields of a living chip; the call takes no reference of ours.
+        // SAFETY: plain fields of a living chip; the call keeps no reference of ours.
         unsafe {
             if (*self.avr).interrupt_state == 0 {
                 return false;
@@ -194,10 +192,10 @@ impl Chip {
         }
     }
 
-    /// Runs instructions for at least `count` cycles, and less when something comes up.
+    /// Runs instructions for at least `count` cycles, or fewer if an event comes up.
     fn run_instructions(&self, count: u64) {
-        // SAFETY: the chip lives; callbacks reach it through shared references and raw pointers
-        // only, as this does.
+        // SAFETY: the chip lives; callbacks reach it only through shared references and raw
+        // pointers, as this function does.
         unsafe {
             let depth = (*self.avr).interrupts.running_ptr;
             (*self.avr).run_cycle_count = count.max(1);
@@ -236,7 +234,7 @@ impl Chip {
         }
     }
 
-    /// The reset is over: the program starts with everything at its initial value.
+    /// The reset has ended: the program starts with every register at its initial value.
     fn start_program(&self) {
         self.reset_core();
         self.held_until.set(None);
@@ -245,7 +243,7 @@ impl Chip {
         pins::refresh(&self.wires.borrow());
     }
 
-    /// simavr's reset without its jump of the clock.
+    /// Resets the core as simavr does, but keeps the cycle count.
     fn reset_core(&self) {
         let at = self.cycle();
         // SAFETY: the chip lives and is between two instructions.

@@ -1,11 +1,11 @@
-//! The USARTs' registers and interrupts, joined to the machines of [`super::usart`].
+//! Joins the USARTs' registers and interrupts to the machines of [`super::usart`].
 //!
 //! ```text
 //!  program --UDRn, UCSRnA, UCSRnB--> machine --frames--> whoever listens to TXD
 //!  program <--interrupts, levels---- machine <--frames-- send_to(), the echo of a shared wire
 //! ```
-//! RXC and UDRE are levels on the chip: their interrupts come again as long as they hold. simavr
-//! forgets an interrupt when it is entered, so the levels are looked at again at each RETI.
+//! On the chip RXC and UDRE are levels: their interrupts come again while the level holds. simavr
+//! forgets an interrupt when it enters it, so this code checks the levels again at each RETI.
 
 use core::cell::{Cell, RefCell};
 use core::ffi::CStr;
@@ -17,7 +17,7 @@ use super::queue::Event;
 use super::usart::{Format, Usart, control, sampled, status};
 use super::usarts::{UBRRH, UBRRL, UCSRA, UCSRB, UCSRC, UsartId};
 
-/// A frame that has wholly left a chip.
+/// A frame that a chip has sent completely.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sent {
     /// The byte.
@@ -32,26 +32,26 @@ pub struct Sent {
 
 type OnSent = Box<dyn Fn(Sent)>;
 
-/// One USART's glue.
+/// One USART: simavr's structure and our machine.
 pub(super) struct Port {
     simavr: *mut ffi::avr_uart_t,
     machine: RefCell<Usart>,
     on_sent: RefCell<Option<OnSent>>,
-    /// Whether TXD and RXD are one wire outside.
+    /// Whether TXD and RXD are joined outside the chip.
     echoes: Cell<bool>,
     sending_since: Cell<u64>,
     sending_life: Cell<u32>,
     receiving_life: Cell<u32>,
 }
 
-/// Both USARTs' glue.
+/// Both USARTs.
 pub(super) struct Ports([Port; 2]);
 
 impl Ports {
     pub(super) fn of(avr: *mut ffi::avr_t) -> Self {
         let mut found = find(avr, c"uart").into_iter();
         Self(core::array::from_fn(|_| Port {
-            // simavr's description of this chip names two.
+            // simavr's description of this chip names two USARTs.
             simavr: found
                 .next()
                 .expect("simavr's atmega1284p has two USARTs")
@@ -70,10 +70,10 @@ impl Ports {
     }
 }
 
-/// simavr's peripherals of a kind, in the order of its description.
+/// All peripherals of one kind in simavr, in the order of its description.
 pub(super) fn find(avr: *mut ffi::avr_t, kind: &CStr) -> Vec<*mut ffi::avr_io_t> {
     let mut found = Vec::new();
-    // SAFETY: simavr's list of peripherals ends with null, and each has a name.
+    // SAFETY: simavr's list of peripherals ends with null, and every entry has a name.
     unsafe {
         let mut io = (*avr).io_port;
         while !io.is_null() {
@@ -87,17 +87,17 @@ pub(super) fn find(avr: *mut ffi::avr_t, kind: &CStr) -> Vec<*mut ffi::avr_io_t>
 }
 
 impl Chip {
-    /// A frame on RXD, its start bit's edge at `from`, sent as 8N1 with `bit` cycles a bit.
+    /// Sends a frame to RXD: its start bit's edge is at `from`, 8N1 with `bit` cycles a bit.
     pub fn send_to(&self, usart: UsartId, from: u64, byte: u8, bit: f64) {
         self.schedule(from, Event::StartBit { usart, byte, bit });
     }
 
-    /// Who is told of frames that have left.
+    /// Sets the receiver of the frames that have left.
     pub fn on_sent(&self, usart: UsartId, action: impl Fn(Sent) + 'static) {
         *self.ports.port(usart).on_sent.borrow_mut() = Some(Box::new(action));
     }
 
-    /// Ties RXD to TXD, as on a half-duplex wire.
+    /// Joins RXD and TXD, as on a half-duplex wire.
     pub fn tie(&self, usart: UsartId) {
         self.ports.port(usart).echoes.set(true);
     }
@@ -107,12 +107,12 @@ impl Chip {
         self.ports.port(usart).machine.borrow().is_sending()
     }
 
-    /// Bytes destroyed on the way in because the program did not read them in time.
+    /// Received bytes that were lost because the program did not read them in time.
     pub fn overruns(&self, usart: UsartId) -> u64 {
         self.ports.port(usart).machine.borrow().overruns()
     }
 
-    /// The USARTs as after a reset.
+    /// Brings the USARTs into their state after a reset.
     pub(super) fn release_ports(&self) {
         for usart in UsartId::BOTH {
             let port = self.ports.port(usart);
@@ -122,7 +122,7 @@ impl Chip {
             let base = usart.base();
             for (offset, value) in [
                 (UCSRA, status::UDRE),
-                // simavr leaves the transmitter on.
+                // simavr would leave the transmitter on.
                 (UCSRB, 0),
                 (UCSRC, 0x06),
                 (UBRRL, 0),
@@ -235,7 +235,7 @@ impl Chip {
             port.machine.borrow_mut().stop_receiver();
             port.receiving_life.set(port.receiving_life.get() + 1);
         }
-        // A frame that has left while its interrupt was off is told of when that is switched on.
+        // If a frame left while its interrupt was off, switching it on raises the interrupt.
         let sent = self.register(usart.base() + UCSRA) & status::TXC != 0;
         if sent && before & control::TXCIE == 0 && value & control::TXCIE != 0 {
             // SAFETY: a living chip's own vector.
@@ -244,7 +244,7 @@ impl Chip {
         self.sync(usart);
     }
 
-    /// Makes UCSRnA and the interrupts say what the machine says.
+    /// Sets UCSRnA and the interrupts to the machine's state.
     pub(super) fn sync(&self, usart: UsartId) {
         let port = self.ports.port(usart);
         let address = usart.base() + UCSRA;
@@ -266,9 +266,9 @@ impl Chip {
         }
     }
 
-    /// Takes back an interrupt that was not yet entered.
+    /// Takes back an interrupt that the core has not entered.
     fn drop_pending(&self, vector: *mut ffi::avr_int_vector_t) {
-        // SAFETY: a vector of a living chip; simavr drops what is no longer pending.
+        // SAFETY: a vector of a living chip; simavr ignores one that is not pending.
         unsafe {
             (*vector).set_pending(0);
             self.interrupts.dropped((*vector).vector);
@@ -292,9 +292,9 @@ impl Chip {
 }
 
 impl Port {
-    /// The vectors: received, sent, buffer empty.
+    /// The vectors for "received", "sent" and "buffer empty".
     pub(super) fn vectors(&self) -> [*mut ffi::avr_int_vector_t; 3] {
-        // SAFETY: the structure lives inside the chip; only addresses are taken.
+        // SAFETY: the structure lives inside the chip; only addresses are calculated.
         unsafe {
             [
                 &raw mut (*self.simavr).rxc,

@@ -1,15 +1,15 @@
-//! One USART of the ATmega1284P as its datasheet describes it, without a clock of its own.
+//! One USART of the ATmega1284P as the datasheet describes it, as a machine without a clock.
 //!
-//! simavr's own counts eleven bits a byte whatever the frame, shows a byte when it is written and
-//! not when it has left, hides overruns in a queue of 64 bytes, and starts with the transmitter
-//! on. So its registers are taken over by this machine; the interrupt vectors stay simavr's.
+//! simavr's own USART counts eleven bits a byte for every frame, shows a byte when it is written
+//! and not when it has left, hides overruns in a queue of 64 bytes, and starts with the transmitter
+//! on. So this machine has its registers; only the interrupt vectors stay simavr's.
 //!
 //! ```text
 //!  UDR --> buffer --> shift register --> TXD        one byte waits while one is sent
 //!  RXD --> shift register --> buffer, 2 bytes --> UDR
 //!              '-- a third byte stays here until the next start bit destroys it: DOR
 //! ```
-//! Times are in cycles of the chip. It knows neither registers' addresses nor interrupts.
+//! Times are in cycles of the chip. The machine knows no register addresses and no interrupts.
 
 use std::collections::VecDeque;
 
@@ -34,7 +34,7 @@ pub(crate) mod control {
     pub(crate) const UCSZ2: u8 = 0x04;
 }
 
-/// Bytes the receive buffer holds beside the shift register.
+/// How many bytes the receive buffer holds, beside the shift register.
 const BUFFER: usize = 2;
 
 /// A frame's shape and speed.
@@ -48,7 +48,7 @@ pub(crate) struct Format {
 }
 
 impl Format {
-    /// What the registers say: UCSRnA, B, C and UBRRn.
+    /// The format in the registers UCSRnA, B, C and UBRRn.
     pub(crate) fn of_registers(ucsra: u8, ucsrb: u8, ucsrc: u8, ubrr: u16) -> Self {
         let per_tick = if ucsra & status::U2X == 0 { 16 } else { 8 };
         let nine = ucsrb & control::UCSZ2 != 0;
@@ -69,15 +69,15 @@ impl Format {
         (1 + self.data_bits + self.parity_bits + self.stop_bits) * self.bit
     }
 
-    /// Cycles from the start bit's edge until the receiver has made up its mind about the first
-    /// stop bit: the last of the three samples in its middle.
+    /// Cycles from the start bit's edge until the receiver has judged the first stop bit, by the
+    /// last of the three samples in its middle.
     pub(crate) fn reception(&self) -> u64 {
         (1 + self.data_bits + self.parity_bits) * self.bit + self.bit * 10 / 16
     }
 }
 
-/// What a receiver of 8N1 with `bit` cycles a bit makes of a byte sent with `sent_bit`: the value,
-/// and whether the stop bit was missing.
+/// How a receiver of 8N1 with `bit` cycles a bit reads a byte sent with `sent_bit`: the value, and
+/// whether the stop bit was missing.
 pub(crate) fn sampled(byte: u8, sent_bit: f64, bit: f64) -> (u8, bool) {
     let level = |position: u32| {
         let at = (f64::from(position) + 0.5) * bit / sent_bit;
@@ -91,7 +91,7 @@ pub(crate) fn sampled(byte: u8, sent_bit: f64, bit: f64) -> (u8, bool) {
     (value, !level(9))
 }
 
-/// A byte that has come in.
+/// A received byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Received {
     byte: u8,
@@ -99,7 +99,7 @@ struct Received {
     overrun: bool,
 }
 
-/// The machine.
+/// The USART's state.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Usart {
     sending: Option<u8>,
@@ -112,7 +112,7 @@ pub(crate) struct Usart {
 }
 
 impl Usart {
-    /// The program writes UDR with the transmitter on; whether a frame starts now.
+    /// The program writes UDR with the transmitter on. Returns whether a frame starts now.
     pub(crate) fn write(&mut self, byte: u8) -> bool {
         if self.sending.is_none() {
             self.sending = Some(byte);
@@ -123,7 +123,7 @@ impl Usart {
         false
     }
 
-    /// A frame has wholly left; the byte, and the byte whose frame starts now.
+    /// A frame has left. Returns its byte, and the byte whose frame starts now.
     pub(crate) fn sent(&mut self) -> (Option<u8>, Option<u8>) {
         let byte = self.sending.take();
         self.sending = self.waiting.take();
@@ -143,7 +143,7 @@ impl Usart {
         });
     }
 
-    /// The frame under way on RXD is complete.
+    /// The frame on RXD is complete.
     pub(crate) fn received(&mut self) {
         self.held = self.receiving.take();
         self.fill();
@@ -172,7 +172,7 @@ impl Usart {
         };
     }
 
-    /// RXC, UDRE, FE and DOR as UCSRnA shows them. TXC belongs to its interrupt.
+    /// RXC, UDRE, FE and DOR as in UCSRnA. TXC is not here: its interrupt handling keeps it.
     pub(crate) fn status(&self) -> u8 {
         let mut bits = 0;
         if self.waiting.is_none() {
@@ -195,8 +195,7 @@ impl Usart {
         self.sending.is_some()
     }
 
-    /// Bytes that were destroyed because the program did not read them in time, since power came
-    /// on.
+    /// Bytes lost since power came on, because the program did not read them in time.
     pub(crate) fn overruns(&self) -> u64 {
         self.overruns
     }
@@ -232,7 +231,7 @@ mod tests {
         // 8E2: parity and a second stop bit.
         assert_eq!(Format::of_registers(0, 0, 0x2E, 1).frame(), 12 * 32);
         assert_eq!(Format::of_registers(0, 0, 0x06, 103).frame(), 16_640);
-        // Nine bits and the last of the samples in the middle of the stop bit.
+        // Nine bits, and the stop bit up to the last sample in its middle.
         assert_eq!(eight_n_one().reception(), 9 * 32 + 20);
     }
 
@@ -280,10 +279,10 @@ mod tests {
     fn a_byte_of_the_wrong_speed_is_another_byte() {
         for byte in 0..=255 {
             assert_eq!(sampled(byte, 32.0, 32.0), (byte, false));
-            // 2 % off is what 8N1 bears.
+            // 8N1 tolerates 2 %.
             assert_eq!(sampled(byte, 32.64, 32.0), (byte, false));
         }
-        // A sender of 9600 Bd is still in its start bit when this receiver wants the stop bit.
+        // A sender at 9600 Bd still sends its start bit when this receiver expects the stop bit.
         assert_eq!(sampled(0xA5, 1_666.7, 32.0), (0, true));
     }
 }

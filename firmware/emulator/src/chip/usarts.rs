@@ -1,6 +1,6 @@
-//! Which USART of the chip, and where the registers of each are.
+//! Names the chip's two USARTs and the addresses of their registers.
 //!
-//! Apart from what the USARTs do, because events that are still to come name theirs as well.
+//! In a file of its own, because the USARTs and the queue of events both need the names.
 
 /// One of the chip's two USARTs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

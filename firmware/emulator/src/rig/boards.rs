@@ -1,6 +1,6 @@
-//! What the boards' pins mean: the multiplexer, the ranger, the motor drivers.
+//! Translates the boards' pins: multiplexer and ranger to readings, motor pins to duties.
 //!
-//! The pin tables of `firmware/avr` seen from the other side.
+//! It mirrors the pin tables of `firmware/avr`.
 
 use core::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use crate::chip::{Chip, Level, Pin, register};
 /// Full scale of both boards' converters, in millivolts.
 const REFERENCE: u32 = 5_000;
 
-/// Address of the line multiplexer, bit 0 first, and its enable, active low.
+/// Address pins of the line multiplexer, bit 0 first; its enable pin is active low.
 const ADDRESS: [Pin; 4] = [
     Pin::new('B', 0),
     Pin::new('B', 1),
@@ -25,22 +25,22 @@ const ENABLE: Pin = Pin::new('B', 4);
 const LINE: u8 = 0;
 const RANGER: u8 = 1;
 
-/// DIR of the left and the right driver. The drivers are mirrored: forwards is low on the left,
-/// high on the right.
+/// DIR pins of the left and the right driver. The drivers are mirrored: forwards is low on the left
+/// and high on the right.
 const LEFT_DIR: Pin = Pin::new('C', 0);
 const RIGHT_DIR: Pin = Pin::new('C', 1);
-/// PWM of the left and the right driver.
+/// PWM pins of the left and the right driver.
 const LEFT_PWM: Pin = Pin::new('D', 7);
 const RIGHT_PWM: Pin = Pin::new('D', 6);
 
-/// What a conversion of the sensor board looked at.
+/// The input of a conversion of the sensor board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Input {
     /// A line sensor, 0 = leftmost.
     Line(u8),
     /// The IR ranger.
     Ranger,
-    /// Nothing: the multiplexer is off, or the channel leads nowhere.
+    /// None: the multiplexer is off, or the channel is not connected.
     Nothing,
 }
 
@@ -49,13 +49,13 @@ pub enum Input {
 pub struct Conversion {
     /// The cycle of the sample.
     pub cycle: u64,
-    /// What was looked at.
+    /// The input that was measured.
     pub input: Input,
-    /// The world's answer: 8 bits for a line sensor, 10 for the ranger.
+    /// The world's value: 8 bits for a line sensor, 10 for the ranger.
     pub reading: u16,
 }
 
-/// A change of what the motor drivers are told.
+/// A change of the duties at the motor drivers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MotorChange {
     /// The cycle of the write.
@@ -64,7 +64,7 @@ pub struct MotorChange {
     pub duties: [i16; 2],
 }
 
-/// The analogue side of the sensor board.
+/// The analogue inputs of the sensor board.
 #[derive(Default)]
 pub(super) struct SensorInputs(RefCell<Option<Vec<Conversion>>>);
 
@@ -82,7 +82,7 @@ impl SensorInputs {
     }
 }
 
-/// Joins the sensor board's converter to the world.
+/// Connects the sensor board's converter to the world.
 pub(super) fn connect_inputs(
     chip: &Rc<Chip>,
     world: &Rc<RefCell<World>>,
@@ -100,7 +100,7 @@ pub(super) fn connect_inputs(
         let (input, reading, code) = match (channel, selected(&board)) {
             (LINE, Some(sensor)) => {
                 let reading = world.read_line(sensor);
-                // The middle of the step, so that no rounding takes it to a neighbour.
+                // The middle of a step, so that no rounding leads to another reading.
                 let code = u32::from(reading) * 4 + 2;
                 (Input::Line(sensor), u16::from(reading), code)
             }
@@ -122,7 +122,7 @@ pub(super) fn connect_inputs(
     inputs
 }
 
-/// The multiplexer's channel, unless it is off.
+/// The multiplexer's channel; `None` if it is off.
 fn selected(board: &Chip) -> Option<u8> {
     if ENABLE.level(board) != Level::Low {
         return None;
@@ -135,13 +135,13 @@ fn selected(board: &Chip) -> Option<u8> {
     Some(channel)
 }
 
-/// The lowest voltage that simavr's converter turns into this 10-bit code: it counts 1023 steps
-/// to the reference.
+/// The lowest voltage that simavr's converter turns into this 10-bit code: it has 1023 steps up to
+/// the reference.
 fn millivolts(code: u32) -> u32 {
     (code * REFERENCE).div_ceil(1_023)
 }
 
-/// The motor drivers as the steering board's registers tell.
+/// The motor drivers' inputs, as the steering board's registers set them.
 #[derive(Default)]
 pub(super) struct Motors {
     duties: Cell<[i16; 2]>,
@@ -158,7 +158,7 @@ impl Motors {
     }
 }
 
-/// Joins the steering board's motor outputs to the world.
+/// Connects the steering board's motor outputs to the world.
 pub(super) fn connect_motors(
     chip: &Rc<Chip>,
     world: &Rc<RefCell<World>>,
@@ -196,22 +196,22 @@ pub(super) fn connect_motors(
     motors
 }
 
-/// Signed duties of the left and the right driver.
+/// Signed duties of the left and the right driver, from the board's registers.
 fn told(board: &Chip) -> [i16; 2] {
     let modes = board.register(register::TCCR2A);
     let runs = board.register(register::TCCR2B) & 0x07 != 0 && modes & 0x03 == 0x03;
     let duty = |pwm: Pin, compare: u8, mode: u8| -> i16 {
         match (pwm.level(board), mode) {
-            // The driver's input is pulled down.
+            // The driver pulls its input down.
             (Level::Floating, _) => 0,
             (Level::Low, 0) => 0,
             (Level::High, 0) => 255,
-            // Cleared on a match: high for the compare value plus one of 256 counts.
+            // Cleared on a match: high for the compare value plus one, of 256 counts.
             (_, 2) if runs => i16::from(board.register(compare)),
             // Set on a match.
             (_, 3) if runs => 255 - i16::from(board.register(compare)),
-            // A timer that stands leaves the pin as it was; a board that does so is wrong, and
-            // the worst is supposed.
+            // A stopped timer leaves the pin as it was. A board that stops it is wrong, so assume
+            // the worst: full duty.
             _ => 255,
         }
     };

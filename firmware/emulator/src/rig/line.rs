@@ -4,7 +4,7 @@
 //!   Pi --write--> bytes back to back at the Pi's rate --> RXD0
 //!   Pi <--take--- bytes with the cycle their frame ended <-- TXD0
 //! ```
-//! Nothing waits for a reader: what the Pi does not fetch is lost when the buffer is full.
+//! Nothing waits for a reader: when the buffer is full, further bytes to the Pi are lost.
 
 use core::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -12,12 +12,12 @@ use std::rc::Rc;
 
 use crate::chip::{Chip, FREQUENCY, UsartId, sampled};
 
-/// Bytes that have arrived at the Pi and wait to be fetched.
+/// At most so many bytes wait until the Pi reads them.
 const PI_BUFFER: usize = 4_096;
 /// Bits of a frame: 8N1.
 const FRAME: f64 = 10.0;
 
-/// How far two baud rates may lie apart: what 8N1 bears with an exact sampler.
+/// Largest difference of two baud rates: 8N1 tolerates it with an exact sampler.
 const TOLERANCE: f64 = 0.04;
 
 /// One cable.
@@ -26,7 +26,7 @@ pub(super) struct PiLine {
     bit: f64,
     free: Cell<f64>,
     cut: Cell<bool>,
-    /// Cycles of the board's last bit if the Pi cannot read bits like that.
+    /// Cycles of a bit of the board's last frame, if the Pi cannot read that rate.
     foreign_bit: Cell<Option<u64>>,
     arrived: RefCell<VecDeque<(u64, u8)>>,
     written: RefCell<Option<Vec<(u64, u8)>>>,

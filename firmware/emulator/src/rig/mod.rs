@@ -1,4 +1,4 @@
-//! Both chips, their wires and the world, in chip time.
+//! Joins both chips, their wires and the world, in chip time.
 //!
 //! ```text
 //!   Pi <--PiLine--> sensor chip --ExDe: data, sync--> steering chip <--PiLine--> Pi
@@ -6,12 +6,12 @@
 //!              multiplexer IR                         motors  servo wire
 //!                    '----'------- lager_plant::World ---'------'
 //! ```
-//! The chips run in lock-step: the one that acts first runs, until the other acts; while both are
-//! awake they alternate by the instruction. Who sleeps is left alone, and an edge on a wire brings
-//! it up to the edge's cycle first. So a run depends on the images, the options and what is
-//! written when, not on how the caller cuts the time.
+//! The chips run in lock-step: the chip that acts first runs until the other one acts; while both
+//! are awake they alternate instruction by instruction. A sleeping chip is left alone, until an
+//! edge on a wire brings it up to the edge's cycle. So a run depends only on the images, the
+//! options, and the bytes written and their times; how the caller divides the time does not matter.
 //!
-//! It reads no clock and does no input or output: that is the shell's.
+//! It reads no clock and does no input or output; the shell does.
 
 mod boards;
 mod line;
@@ -23,7 +23,7 @@ use std::rc::Rc;
 
 use lager_plant::arm::SERVOS;
 use lager_plant::noise::Noise;
-use lager_plant::{Make, Warehouse, WarehouseError, World, WorldState};
+use lager_plant::{Make, Snapshot, Warehouse, WarehouseError, World, WorldState};
 use thiserror::Error;
 
 use crate::chip::{Chip, FREQUENCY, Image, ImageError, Pin, ResetLine, Wire, wire};
@@ -34,14 +34,14 @@ pub use servos::{ServoByte, ServoWire};
 use boards::{Motors, SensorInputs};
 use line::PiLine;
 
-/// The divider between battery and input.
+/// The voltage divider between the battery and the board's input.
 const BATTERY_DIVIDER: u32 = 4;
-/// Where the servos stand before anybody has moved them: the pose the arm is carried in, the claw
-/// open. An unpowered arm stays where it was put down.
+/// The servos' first positions: the arm in its pose for driving, the claw open. An unpowered arm
+/// stays where somebody put it.
 const RESTING_ARM: [u16; SERVOS] = [512, 600, 423, 400, 623, 512, 512, 512];
-/// The stream of noise that spreads the boards' starts.
+/// Number of the random sequence that sets the boards' start times.
 const START_STREAM: u64 = 100;
-/// The most the two crystals' starts are apart, in cycles: 5 ms.
+/// The boards start at most this many cycles apart: 5 ms.
 const START_SPREAD: u64 = FREQUENCY / 200;
 
 /// One of the two boards.
@@ -76,14 +76,14 @@ pub struct Images {
     pub steering: Image,
 }
 
-/// How a rig is built.
+/// Options of a rig.
 #[derive(Clone, Debug)]
 pub struct RigOptions {
-    /// The world.
+    /// The warehouse of the world.
     pub warehouse: Warehouse,
     /// Chooses every imperfection: the same seed is the same robot.
     pub seed: u64,
-    /// Which imperfections there are.
+    /// The kind of imperfections.
     pub make: Make,
     /// Baud rate of the Pi's ends of both lines.
     pub baud: u32,
@@ -100,7 +100,7 @@ pub enum RigError {
     Image(#[from] ImageError),
 }
 
-/// World time against the chips' cycles.
+/// Converts between world time and the chips' cycles.
 #[derive(Debug, Default)]
 pub(crate) struct Epoch(Cell<u64>);
 
@@ -110,7 +110,7 @@ impl Epoch {
         Duration::from_nanos(self.0.get() + nanoseconds(cycle))
     }
 
-    /// The first cycle that is not before a world time.
+    /// The first cycle at or after a world time.
     pub(crate) fn cycle(&self, world: Duration) -> u64 {
         let since = (world.as_nanos() as u64).saturating_sub(self.0.get());
         (since * 2).div_ceil(125)
@@ -153,7 +153,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Both boards at the start of a warehouse, power just on.
+    /// Both boards at the start of a warehouse; power comes on now.
     ///
     /// # Errors
     /// The warehouse cannot be built or a chip cannot be made.
@@ -193,8 +193,8 @@ impl Rig {
         })
     }
 
-    /// Goes on from a kept world: power comes on again at the kept time. Only for a rig that has
-    /// not run.
+    /// Goes on from a kept world: power comes on again at the kept time. Call it before the rig has
+    /// run.
     pub fn resume(&mut self, state: &WorldState) {
         self.world.borrow_mut().restore(state);
         let now = state.time.as_nanos() as u64;
@@ -213,9 +213,22 @@ impl Rig {
         Duration::from_nanos(nanoseconds(self.cycle))
     }
 
-    /// Time since the start of the world; differs from [`Rig::now`] after [`Rig::resume`].
+    /// Time since the start of the world. After [`Rig::resume`] it differs from [`Rig::now`].
     pub fn world_time(&self) -> Duration {
         self.epoch.world(self.cycle)
+    }
+
+    /// The true state of the robot and the goods.
+    pub fn truth(&self) -> Snapshot {
+        let world = self.world.borrow();
+        Snapshot {
+            world: WorldState {
+                time: self.world_time(),
+                ..world.state()
+            },
+            duties: self.duties(),
+            carrying: world.goods().held(),
+        }
     }
 
     /// Runs both chips for `time`.
@@ -223,11 +236,12 @@ impl Rig {
         self.run_until(self.cycle + cycles(time));
     }
 
-    /// Runs both chips to a cycle; what lies behind is ignored.
+    /// Runs both chips to a cycle; a cycle in the past does nothing.
     pub fn run_until(&mut self, target: u64) {
         loop {
             let (sensor, steering) = (self.sensor.next_action(), self.steering.next_action());
-            // Who acts first runs, at most until the other acts; who sleeps is left alone.
+            // The chip that acts first runs until the other acts at most; a sleeping chip is left
+            // alone.
             let (first, at, other) = if sensor <= steering {
                 (&self.sensor, sensor, steering)
             } else {
@@ -244,36 +258,36 @@ impl Rig {
         self.advance_world();
     }
 
-    /// The Pi writes to a board; the bytes leave at the baud rate from now on.
+    /// The Pi writes to a board; the bytes leave one after the other at the baud rate.
     pub fn write(&mut self, board: Board, bytes: &[u8]) {
         self.lines[board as usize].write(self.chip(board), self.cycle, bytes);
     }
 
-    /// Takes the bytes that have arrived at the Pi by now, each with the cycle of its stop bit's
-    /// end.
+    /// Takes the bytes that have arrived at the Pi, each with the cycle in which its stop bit
+    /// ended.
     pub fn read(&mut self, board: Board) -> Vec<(u64, u8)> {
         self.lines[board as usize].take(self.cycle)
     }
 
-    /// From now on remembers every byte the Pi writes.
+    /// Records every byte that the Pi writes from now on.
     pub fn record_written(&mut self) {
         for line in &self.lines {
             line.record();
         }
     }
 
-    /// The bytes written to a board and remembered since the last call, each with the cycle of its
-    /// stop bit's end.
+    /// The bytes written to a board since the last call, each with the cycle in which its stop bit
+    /// ends.
     pub fn take_written(&mut self, board: Board) -> Vec<(u64, u8)> {
         self.lines[board as usize].take_written()
     }
 
-    /// The baud rate at which a board has sent last, if it is not that of the Pi's end.
+    /// The baud rate of a board's last frame, if the Pi's end has another one.
     pub fn foreign_baud(&self, board: Board) -> Option<u32> {
         self.lines[board as usize].foreign_baud()
     }
 
-    /// Cuts a board's cable to the Pi, or mends it.
+    /// Cuts or mends a board's cable to the Pi.
     pub fn cut(&mut self, board: Board, cut: bool) {
         self.lines[board as usize].cut(cut);
     }
@@ -291,12 +305,12 @@ impl Rig {
         self.chip(board).reset(line);
     }
 
-    /// Lets a board's main loop hang.
+    /// Makes a board's main loop hang.
     pub fn hang(&mut self, board: Board) {
         self.chip(board).hang();
     }
 
-    /// The same with interrupts off for good.
+    /// Makes a board's main loop hang with interrupts off.
     pub fn hang_with_interrupts_off(&mut self, board: Board) {
         self.chip(board).hang_with_interrupts_off();
     }
@@ -316,7 +330,7 @@ impl Rig {
         self.world.borrow()
     }
 
-    /// The world, for what tests do to it.
+    /// The world, for tests that change it.
     pub fn world_mut(&mut self) -> RefMut<'_, World> {
         self.world.borrow_mut()
     }
@@ -331,12 +345,12 @@ impl Rig {
         self.motors.take_changes()
     }
 
-    /// From now on remembers every conversion of the sensor board.
+    /// Records every conversion of the sensor board from now on.
     pub fn record_conversions(&mut self) {
         self.inputs.record();
     }
 
-    /// The conversions remembered since the last call.
+    /// The conversions recorded since the last call.
     pub fn take_conversions(&mut self) -> Vec<Conversion> {
         self.inputs.take()
     }

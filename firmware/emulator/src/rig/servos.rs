@@ -4,8 +4,8 @@
 //!   TXD1 --.-- wire --> servos of the world        a byte counts when its stop bit is over
 //!   RXD1 --'   wire <-- their answers, at 1 Mbit/s after the return delay
 //! ```
-//! RXD1 and TXD1 are tied, so a board that does not mute its receiver hears itself. Bytes at
-//! another speed than the servos' are noise to them.
+//! RXD1 and TXD1 are joined, so a board that does not mute its receiver hears its own bytes. Bytes
+//! at a speed other than the servos' are noise to them.
 
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
@@ -19,21 +19,21 @@ use crate::chip::{Chip, FREQUENCY, Sent, UsartId};
 /// Cycles of one bit at 1 Mbit/s, and of one byte.
 const BIT: u64 = FREQUENCY / 1_000_000;
 const BYTE: u64 = 10 * BIT;
-/// The tag of the alarm before an answer's byte.
+/// Tag of the alarm for an answer's next byte.
 const ANSWER: u32 = 1;
 
 /// A byte on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoByte {
-    /// The cycle its stop bit ended, or will end.
+    /// The cycle in which its stop bit ended or will end.
     pub cycle: u64,
-    /// Whether the board sent it; else a servo did.
+    /// Whether the board sent it; otherwise a servo did.
     pub from_board: bool,
     /// The byte.
     pub byte: u8,
 }
 
-/// The wire.
+/// The servos' wire.
 pub struct ServoWire {
     chip: Weak<Chip>,
     world: Rc<RefCell<World>>,
@@ -44,7 +44,7 @@ pub struct ServoWire {
     tap: RefCell<Option<Vec<ServoByte>>>,
 }
 
-/// Joins the steering board's second USART to the servos.
+/// Connects the steering board's second USART to the servos.
 pub(super) fn connect(
     chip: &Rc<Chip>,
     world: &Rc<RefCell<World>>,
@@ -71,12 +71,12 @@ pub(super) fn connect(
 }
 
 impl ServoWire {
-    /// From now on remembers every byte.
+    /// Records every byte from now on.
     pub fn record(&self) {
         *self.tap.borrow_mut() = Some(Vec::new());
     }
 
-    /// The bytes remembered since the last call.
+    /// The bytes recorded since the last call.
     pub fn take(&self) -> Vec<ServoByte> {
         self.tap
             .borrow_mut()
@@ -85,7 +85,7 @@ impl ServoWire {
             .unwrap_or_default()
     }
 
-    /// Bytes the board sent at another speed than the servos'.
+    /// Bytes that the board sent at a speed other than the servos'.
     pub fn strange_bytes(&self) -> u64 {
         self.strange.get()
     }
@@ -117,7 +117,7 @@ impl ServoWire {
         }
     }
 
-    /// A start bit of an answer, unless the board has spoilt it meanwhile.
+    /// Sends the answer's next byte, unless the board has written over the answer since.
     fn answer(&self, cycle: u64) {
         if cycle < self.armed.get() {
             return;

@@ -13,8 +13,8 @@ fn an_interrupt_takes_four_cycles_to_enter_and_eight_from_sleep() {
     let log = noted(&chip, 9);
     let at = |index: usize| u16::from_le_bytes([log[index], log[index + 1]]);
     let (awake, asleep) = (at(0), at(3));
-    // The match shows one count after 1000; four cycles, three for the jump at the vector, two
-    // for the load, of which the first reads.
+    // The match shows one count after 1000. Then come four cycles of entry, three of the jump at
+    // the vector and two of the load, which reads in its first.
     assert!((1_007..=1_009).contains(&awake), "{awake}");
     assert_eq!(asleep, awake + 4);
 }
@@ -33,7 +33,7 @@ fn a_sleeping_chip_costs_no_time_of_ours() {
     let hour = milliseconds(3_600_000);
     chip.run_until(START + hour);
     assert!(chip.slept() > hour - milliseconds(10));
-    // simavr's own loop would sleep for the hour; the bound is a watchdog, not a measurement.
+    // simavr's own loop would sleep for a real hour; this limit is a watchdog and measures nothing.
     assert!(start.elapsed() < Duration::from_secs(600));
 }
 
@@ -62,7 +62,7 @@ fn the_clock_goes_on_over_a_reset() {
 #[test]
 fn the_watchdog_resets_a_program_that_does_not_serve_its_interrupt() {
     let chip = chip("watchdog.c", "watchdog");
-    // Twice 16.384 ms (2048 cycles of 128 kHz are 16 ms), then the start-up time.
+    // Two time-outs of 16.384 ms (2048 cycles of 128 kHz are 16 ms), then the start-up time.
     chip.run_until(START + milliseconds(33));
     assert_eq!(chip.resets(), 1);
     assert_eq!(noted(&chip, 2), [1, 0x01], "power");

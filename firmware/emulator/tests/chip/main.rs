@@ -1,4 +1,4 @@
-//! Where simavr departs from the ATmega1284P: each correction has a test that fails without it.
+//! Tests for each correction of simavr; each fails without its correction.
 //!
 //! The programs are a few lines of C or assembler in `tests/images`.
 

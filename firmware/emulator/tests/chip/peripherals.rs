@@ -1,4 +1,4 @@
-//! Converter, EEPROM, timers' outputs and masks.
+//! The converter, the EEPROM, the timers' outputs and the interrupt masks.
 
 use crate::support::{START, chip, milliseconds, noted, noted_words};
 
@@ -9,7 +9,7 @@ fn a_conversion_takes_13_of_the_converters_clocks_and_the_first_25() {
     chip.run_until(START + milliseconds(1));
     let log = noted_words(&chip, 4);
     assert_eq!(log[3], 1, "the program is done");
-    // The program adds what it needs to start, to see the end and to read the timer.
+    // The program itself needs time to start, to notice the end and to read the timer.
     assert!((25 * 16..25 * 16 + 30).contains(&log[0]), "{}", log[0]);
     assert!((13 * 16..13 * 16 + 30).contains(&log[1]), "{}", log[1]);
     assert_eq!(log[2], 511);
@@ -29,7 +29,7 @@ fn an_eeprom_byte_takes_its_time() {
     let chip = chip("outputs.c", "eeprom");
     chip.run_until(START + milliseconds(10));
     let took = u16::from_le_bytes([noted(&chip, 18)[16], noted(&chip, 18)[17]]);
-    // 3.4 ms in steps of 4 microseconds.
+    // 3.4 ms, counted in steps of 4 microseconds.
     assert!((848..=852).contains(&took), "{took}");
     assert_eq!(chip.eeprom(8)[7], 0x5A);
 }

@@ -1,4 +1,4 @@
-//! The USARTs as the data sheet has them.
+//! The USARTs behave as the datasheet says.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -31,7 +31,7 @@ fn a_byte_takes_ten_bits_and_leaves_when_its_last_stop_bit_is_over() {
     let sent = listen(&chip, UsartId::Zero);
     chip.run_until(START + milliseconds(1));
     let sent = sent.borrow();
-    // 0x99 was written while the transmitter was off, as it is after a reset.
+    // The program wrote 0x99 while the transmitter was off, as it is after a reset.
     let bytes: Vec<_> = sent.iter().map(|frame| frame.byte).collect();
     assert_eq!(bytes, [0x11, 0x22]);
     assert_eq!(sent[0].to - sent[0].from, BYTE);
@@ -50,8 +50,8 @@ fn a_byte_is_received_in_the_middle_of_its_stop_bit() {
     chip.run_until(from + milliseconds(1));
     let sent = sent.borrow();
     assert_eq!(sent[0].byte, 0x42);
-    // Nine bits and ten sixteenths, eight cycles from sleep into the interrupt, three for the
-    // jump at the vector, and the handler's first instructions.
+    // Nine bits and ten sixteenths of one, eight cycles of entry from sleep, three of the jump at
+    // the vector, and the handler's first instructions.
     let answered = sent[0].from - from - (9 * BIT + 20);
     assert!((11..60).contains(&answered), "{answered} cycles");
 }
@@ -91,7 +91,7 @@ fn a_byte_at_another_speed_is_a_framing_error() {
 fn interrupts_come_again_while_their_level_holds() {
     let chip = chip("levels.c", "levels");
     chip.run_until(START + milliseconds(1) / 2);
-    // Both bytes are there before the program wants to know of them.
+    // Both bytes arrive before the program turns on its interrupts.
     send(&chip, &[7, 8]);
     chip.run_until(START + milliseconds(3));
     assert_eq!(noted(&chip, 4), [5, 2, 7, 8]);

@@ -1,4 +1,4 @@
-//! Small images, compiled with avr-gcc when they are wanted.
+//! Compiles small images with avr-gcc and makes chips of them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,10 +6,10 @@ use std::rc::Rc;
 
 use lager_emulator::chip::{Chip, FREQUENCY, Image};
 
-/// Cycles from power to the first instruction: 65 ms and 14.
+/// Cycles from power to the first instruction: 65 ms and 14 cycles.
 pub(crate) const START: u64 = FREQUENCY * 65 / 1_000 + 14;
 
-/// Where the images note what they saw.
+/// The address at which the images note their results.
 const LOG: u16 = 0x3F00;
 
 /// Compiles an image of `tests/images`; every test has its own output.
@@ -32,17 +32,17 @@ fn image(source: &str, test: &str) -> Image {
     Image::read(&out).expect("avr-gcc writes images for AVRs")
 }
 
-/// A chip with that image, power just on.
+/// A chip with that image; power comes on now.
 pub(crate) fn chip(source: &str, test: &str) -> Rc<Chip> {
     Chip::new(&image(source, test), 0, 1).expect("simavr knows the chip")
 }
 
-/// Bytes the program noted.
+/// The first bytes that the program noted.
 pub(crate) fn noted(chip: &Chip, count: usize) -> Vec<u8> {
     chip.memory(LOG, count)
 }
 
-/// Words the program noted.
+/// The first words that the program noted.
 pub(crate) fn noted_words(chip: &Chip, count: usize) -> Vec<u16> {
     noted(chip, 2 * count)
         .chunks_exact(2)
@@ -50,7 +50,7 @@ pub(crate) fn noted_words(chip: &Chip, count: usize) -> Vec<u16> {
         .collect()
 }
 
-/// Cycles of so many milliseconds.
+/// This many milliseconds, in cycles.
 pub(crate) const fn milliseconds(count: u64) -> u64 {
     FREQUENCY * count / 1_000
 }

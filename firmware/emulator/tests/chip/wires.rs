@@ -4,7 +4,7 @@ use lager_emulator::chip::{Chip, Pin, ResetLine, wire};
 
 use crate::support::{START, chip, milliseconds, noted};
 
-/// Runs both without any care: the wire has to.
+/// Runs one chip after the other; only the wire keeps them together.
 fn run(one: &Chip, other: &Chip, to: u64) {
     one.run_until(to);
     other.run_until(to);
@@ -16,7 +16,7 @@ fn an_edge_wakes_the_other_chip_at_its_own_cycle() {
     let receiver = chip("counter.c", "edges");
     let wire = wire(&sender, Pin::new('D', 4), &receiver, Pin::new('B', 2));
     wire.record();
-    // The receiver never runs by itself here: only the edges bring it along.
+    // The test never runs the receiver further by itself; only the edges do.
     receiver.run_until(START + milliseconds(1));
     sender.run_until(START + milliseconds(8));
     assert_eq!((wire.rises(), noted(&receiver, 1)[0]), (10, 10));

@@ -13,7 +13,7 @@ use lager_wire::{
 
 use crate::support::Robot;
 
-/// The longest any arm command may take: its longest sequence has three parts of 4 s each.
+/// No arm command takes longer: the longest sequence has three parts of 4 s each.
 const LONGEST: Duration = Duration::from_secs(14);
 
 /// A robot whose servos are in service and whose arm is unlocked.
@@ -26,7 +26,7 @@ fn ready(seed: u64) -> Robot {
     robot
 }
 
-/// Gives an arm command and waits for its end; the flags told with it.
+/// Gives an arm command, waits for its end, and returns the flags of the report about it.
 fn carry_out(robot: &mut Robot, command: ArmCommand) -> SteerFlags {
     let seq = robot.steering.order(&mut robot.rig, Command::Arm(command));
     let mut waited = Duration::ZERO;
@@ -60,7 +60,7 @@ fn packets(robot: &Robot) -> Vec<Vec<u8>> {
     packets
 }
 
-/// Tells the board a setting; whether it takes it.
+/// Sends the board a setting; returns whether the board accepts it.
 fn set(robot: &mut Robot, key: SettingKey, seq: u8, value: i16) -> bool {
     let setting = Setting { key, seq, value };
     robot.steering.packets.clear();
@@ -81,14 +81,14 @@ fn set(robot: &mut Robot, key: SettingKey, seq: u8, value: i16) -> bool {
         .expect("the board answers")
 }
 
-/// Packets that write something (instruction 3); the others are questions.
+/// The packets that write (instruction 3), without the questions.
 fn writes(robot: &Robot) -> Vec<Vec<u8>> {
     let mut packets = packets(robot);
     packets.retain(|packet| packet[4] == 3);
     packets
 }
 
-/// The first writes of a command in the pose the arm is carried in: position, speed and torque of
+/// The first writes of each command in the arm's pose for driving: position, speed and torque of
 /// each joint's servo, checked by hand against the AX-12's manual. If this fails do not change it.
 #[test]
 fn each_command_writes_its_golden_bytes() {
@@ -146,12 +146,12 @@ fn each_command_writes_its_golden_bytes() {
                 "FF FF 08 09 03 1E F7 01 00 00 FF 03 D3",
             ],
         ),
-        // Opening, softly: speed 100.
+        // Opens softly: speed 100.
         (
             ArmCommand::Release,
             &["FF FF 08 09 03 1E 00 02 64 00 FF 03 65"],
         ),
-        // To the drop pose (512, 300 and 723, 512 and 511, 512), open, and back.
+        // Moves to the drop pose (512, 300 and 723, 512 and 511, 512), opens, and moves back.
         (
             ArmCommand::Drop,
             &[
@@ -233,7 +233,7 @@ fn an_unplugged_servo_holds_up_nobody_for_long() {
     let flags = carry_out(&mut robot, ArmCommand::Left);
     assert!(!flags.contains(SteerFlags::ABORTED), "servo 1 works");
     assert!(robot.steering_status().servo_timeouts > 0);
-    // Plugged in again it is brought into service in its turn.
+    // When servo 3 is plugged in again, the board brings it into service in its turn.
     robot.rig.world_mut().servos().set_present(3, true);
     robot.run(Duration::from_secs(3));
     assert_eq!(robot.report().servo_errors, 0);

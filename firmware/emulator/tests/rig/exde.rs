@@ -11,7 +11,7 @@ use crate::support::{Robot, milliseconds};
 /// Bits of a word.
 const WORD: usize = 11;
 
-/// Words among rises of sync: a silence of 50 microseconds keeps them apart.
+/// The number of rises of sync in each word; a silence of 50 microseconds ends a word.
 fn words(edges: &[(u64, bool)]) -> Vec<usize> {
     let rises: Vec<u64> = edges
         .iter()
@@ -32,13 +32,13 @@ fn a_lost_pulse_costs_one_word_and_not_all() {
     let before = robot.steering_status().exde_errors;
     for loss in 0..LOSSES {
         robot.rig.exde().sync.lose(1);
-        // Another bit of the word each time.
+        // Each loss hits another bit of the word.
         robot.run(Duration::from_micros(20_000 + 37 * u64::from(loss)));
     }
     let told = robot.steering.packets.clone();
     let after = robot.steering_status().exde_errors;
     assert_eq!(robot.rig.exde().sync.lost(), u64::from(LOSSES));
-    // A word whose middle is missing falls into two pieces, and each is refused.
+    // A word without its middle arrives as two pieces, and the board refuses each.
     let errors = after - before;
     assert!((LOSSES..=2 * LOSSES).contains(&errors), "{errors} errors");
     assert!(told.len() > 20);
@@ -70,6 +70,24 @@ fn words_are_whole_and_follow_the_tape() {
         let error = robot.report().line_error;
         assert!((error - wanted).abs() <= 1, "{left} mm: {error}");
     }
+}
+
+#[test]
+fn a_packet_leaves_for_the_pi_while_a_word_is_sent() {
+    let mut robot = Robot::up(3);
+    robot.sensor.packets.clear();
+    robot.rig.exde().sync.record();
+    robot.run(Duration::from_millis(200));
+    let edges = robot.rig.exde().sync.take_edges();
+    let packets = robot.sensor.packets.iter();
+    let meanwhile = packets.filter(|sent| {
+        let of_word = edges
+            .iter()
+            .filter(|edge| (sent.from..sent.to).contains(&edge.0));
+        of_word.count() > 1
+    });
+    let both = meanwhile.count();
+    assert!(both > 20, "{both} of {}", robot.sensor.packets.len());
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Whatever dies, the motors are off within 200 ms of chip time.
+//! Whatever fails, the motors are off within 200 ms of chip time.
 
 use std::time::Duration;
 
@@ -71,7 +71,7 @@ fn the_steering_boards_main_loop_hangs() {
     let mut robot = Robot::driving(5);
     robot.rig.hang(Board::Steering);
     let hung = robot.rig.cycle();
-    // The watchdog's interrupt switches them off, and the reset comes after it.
+    // The watchdog's interrupt switches the motors off; the reset comes after it.
     while robot.rig.duties() != [0, 0] {
         robot.run(Duration::from_millis(1));
         assert_eq!(robot.rig.chip(Board::Steering).resets(), 0);
@@ -89,7 +89,7 @@ fn the_steering_boards_main_loop_hangs_with_interrupts_off() {
     let mut robot = Robot::driving(8);
     robot.rig.hang_with_interrupts_off(Board::Steering);
     let hung = robot.rig.cycle();
-    // The watchdog's interrupt cannot come; its second time-out resets the chip.
+    // The watchdog's interrupt cannot run; its second time-out resets the chip.
     let off = robot.run_until_off(LIMIT);
     let took = off.expect("the motors went off") - hung;
     assert!(took <= milliseconds(200), "{took} cycles");
@@ -130,7 +130,7 @@ fn the_tape_is_gone() {
     let seq = robot.wheels(WheelCommand::ActiveForward);
     robot.run(Duration::from_millis(500));
     assert_ne!(robot.rig.duties(), [0, 0]);
-    // Bare floor for more than the way it drives.
+    // Bare floor, farther than the robot drives.
     robot.place(200.0);
     let gone = robot.rig.cycle();
     let off = robot.run_until_off(Duration::from_millis(2_500));
@@ -145,7 +145,7 @@ fn the_tape_is_gone() {
         .with(SteerFlags::EXDE_OK);
     assert!(report.flags.contains(stopped), "{report:?}");
     assert_eq!(report.finished_seq, seq);
-    // Renewed and on tape again: only another command counts.
+    // A renewal and tape do not start the robot; only another command does.
     robot.place(0.0);
     robot.rig.take_motor_changes();
     robot.run(Duration::from_millis(1_000));
@@ -162,8 +162,8 @@ fn a_reset_in_the_middle_of_driving() {
     robot.rig.take_motor_changes();
     robot.rig.reset(Board::Steering, ResetLine::External);
     assert_eq!(robot.rig.duties(), [0, 0], "at once");
-    // The Pi goes on renewing the order of before; the board that starts anew takes it up when
-    // both have shaken hands, and never for an instant before.
+    // The Pi still renews its old order. The restarted board carries it out when both have shaken
+    // hands, and never before.
     robot.run(Duration::from_millis(66));
     let before = robot.rig.take_motor_changes();
     assert_eq!(before.len(), 1, "{before:?}");

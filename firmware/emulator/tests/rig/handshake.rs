@@ -1,4 +1,4 @@
-//! Coming up, and why.
+//! The boards connect to the Pi, and tell it why they started.
 
 use std::time::Duration;
 

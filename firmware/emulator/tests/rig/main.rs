@@ -1,7 +1,7 @@
-//! The two boards' real images, as chips, in chip time.
+//! Tests the two boards' real images as chips, in chip time.
 //!
-//! They are read from `firmware/avr/target/images`, or from the folder LAGER_IMAGES names, with
-//! those for 9600 Bd in `9600` below it; without them these tests fail and say how to build them.
+//! The images are in `firmware/avr/target/images` or in the folder LAGER_IMAGES, those for 9600 Bd
+//! in `9600` below it. Without images these tests fail and say how to build them.
 
 mod arm;
 mod disturbance;

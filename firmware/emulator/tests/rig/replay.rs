@@ -1,5 +1,5 @@
-//! The same recorded inputs give the same outputs from the chip and from the host's build of the
-//! very same control code, frame by frame.
+//! With the same recorded inputs, the chip and the host's build of the same control code must give
+//! the same outputs, frame by frame.
 //!
 //! ```text
 //!   chip:  conversions, bytes, words --> image ------------> packets, words, duties
@@ -12,14 +12,14 @@ use lager_wire::{Decoder, Packet, Payload, Setting, Version, WheelCommand};
 
 use crate::support::{Robot, SLOW, milliseconds};
 
-/// Sensors of the line, and bits of a word.
+/// How many line sensors there are, and how many bits a word has.
 pub(crate) const SENSORS: usize = 11;
 
 pub(crate) fn microseconds(cycle: u64) -> u32 {
     (cycle / 16) as u32
 }
 
-/// The packets among what a unit sent, but for those that tell of its own load, and handshakes.
+/// The packets that a unit sent, without handshakes and reports of its own load.
 pub(crate) fn told(bytes: &[u8]) -> Vec<Payload> {
     let mut decoder = Decoder::new(Version::One);
     bytes
@@ -34,7 +34,7 @@ pub(crate) fn is_compared(payload: &Payload) -> bool {
     !matches!(payload, Payload::Handshake(_) | Payload::BoardStatus(_))
 }
 
-/// Words on the wire: the cycle of the last rise, and the bits.
+/// The words on the wire: the cycle of the last rise, and the bits.
 pub(crate) fn words(robot: &Robot) -> Vec<(u64, u16)> {
     let data = robot.rig.exde().data.take_edges();
     let rises: Vec<u64> = robot
@@ -62,8 +62,8 @@ pub(crate) fn words(robot: &Robot) -> Vec<(u64, u16)> {
         .collect()
 }
 
-/// A drive with turns of the tape under the sensors, everything recorded from power on. On slow
-/// lines it is a longer one, as there is less to compare in the same time.
+/// A drive in which the tape moves under the sensors; everything is recorded from power-on. It is
+/// longer on slow lines, where less can be compared in the same time.
 pub(crate) fn drive(baud: u32, settings: &[Setting]) -> Robot {
     let mut robot = Robot::at(baud, 11);
     let longer = if baud == SLOW { 10 } else { 1 };
@@ -97,7 +97,7 @@ pub(crate) fn drive(baud: u32, settings: &[Setting]) -> Robot {
     robot
 }
 
-/// What both boards on the host have in common.
+/// The parts of a host's board that both boards have.
 macro_rules! board {
     ($host:ident) => {
         impl lager_control::Board for $host {

@@ -1,4 +1,4 @@
-//! The sensor board: what it tells the Pi and the steering board, chip and host beside each other.
+//! The sensor board: compares the outputs of chip and host for the Pi and for the steering board.
 
 use lager_control::{SensorBoard, SensorConfig, SensorUnit};
 use lager_emulator::rig::{Board, Conversion, Input};
@@ -7,7 +7,7 @@ use lager_wire::Payload;
 use crate::replay::{SENSORS, board, drive, is_compared, microseconds, told, words};
 use crate::support::{FAST, SLOW};
 
-/// The sensor board on the host, fed with what the chip's converter saw.
+/// The sensor board on the host; it gets the readings of the chip's converter.
 struct SensorHost {
     now_us: u32,
     bytes: std::vec::IntoIter<(u64, u8)>,
@@ -44,7 +44,7 @@ impl SensorBoard for SensorHost {
     }
 }
 
-/// Passes of the sensor board: each begins with the leftmost sensor.
+/// The passes of the sensor board; each begins with the leftmost sensor.
 fn passes(conversions: &[Conversion]) -> Vec<Vec<Conversion>> {
     let mut passes: Vec<Vec<Conversion>> = Vec::new();
     for conversion in conversions {
@@ -89,7 +89,7 @@ fn compare(baud: u32) {
         sent: Vec::new(),
         words: Vec::new(),
     };
-    // A pass is due in every step: the chip has decided when.
+    // Here a pass is due in every step, because the chip has decided when.
     let config = SensorConfig {
         loop_period_us: 1,
         ..SensorConfig::FAST

@@ -1,4 +1,4 @@
-//! The steering board: what the motors get, chip and host beside each other.
+//! The steering board: compares the duties of chip and host.
 
 use lager_control::line::LineReader;
 use lager_control::{Motor, SteeringBoard, SteeringConfig, SteeringUnit};
@@ -8,11 +8,11 @@ use lager_wire::{LineBits, Setting, SettingKey};
 use crate::replay::{board, drive, microseconds, words};
 use crate::support::{FAST, SLOW, milliseconds};
 
-/// How many words the chip may be late, whose work may reach into the next word, or the host, which
-/// hears of the Pi's bytes only with a word.
+/// The two may differ by so many words. The chip's work may reach into the next word, and the host
+/// gets the Pi's bytes only together with a word.
 const LATEST: usize = 2;
 
-/// The steering board on the host, fed with the words on the wire and the Pi's bytes.
+/// The steering board on the host; it gets the words on the wire and the Pi's bytes.
 struct SteeringHost {
     now_us: u32,
     bytes: std::vec::IntoIter<(u64, u8)>,
@@ -61,19 +61,19 @@ fn duties_at(changes: &[MotorChange], cycle: u64) -> [i16; 2] {
         .map_or([0, 0], |change| change.duties)
 }
 
-/// What chip and host made of a word.
+/// The duties of chip and host after a word.
 struct Compared {
     cycle: u64,
     chip: [i16; 2],
     host: [i16; 2],
-    /// How far apart the two may be.
+    /// Duties may differ by this much.
     tolerance: i16,
-    /// Whether an order of the Pi came in between.
+    /// Whether an order of the Pi came between two words.
     disturbed: bool,
 }
 
 impl Compared {
-    /// Whether the chip did what the host made of `word`.
+    /// Whether the chip's duties are those of the host after `word`.
     fn agrees_with(&self, word: &Self) -> bool {
         (0..2).all(|side| (self.chip[side] - word.host[side]).abs() <= word.tolerance)
     }
@@ -119,9 +119,9 @@ fn duties_by_word(baud: u32, settings: &[Setting], d: i32) -> Vec<Compared> {
     compared
 }
 
-/// D is a difference to the newest sample at least 7.5 ms old, scaled by its age. The chip reads
-/// its clock some microseconds later than the edge, so where the choice of the sample or the
-/// quotient's rounding hangs on these, either is right.
+/// D uses the newest sample that is at least 7.5 ms old, and divides by its age. The chip reads its
+/// clock some microseconds after the edge. Where these decide which sample is used or how the
+/// quotient is rounded, both results are right.
 fn tolerance(past: &[(u64, i32)], cycle: u64, error: i32, d: i32) -> i16 {
     let candidates: Vec<i32> = past
         .iter()
@@ -147,7 +147,7 @@ fn assert_alike(compared: &[Compared]) {
     assert!(seen.len() >= 8, "the tape was at many places: {seen:?}");
     let exact = compared.iter().filter(|word| word.tolerance == 0).count();
     assert!(exact * 2 > compared.len(), "{exact} of {}", compared.len());
-    // A loop of the chip that tells much takes longer than a word: then it acts late.
+    // A pass of the chip that sends much takes longer than a word; then the chip acts late.
     let mut late = 0;
     for latest in compared.windows(LATEST + 1) {
         let word = &latest[LATEST];

@@ -1,4 +1,4 @@
-//! Settings at run time, and what is left of them without power.
+//! Settings that change at run time, and settings that survive without power.
 
 use std::time::Duration;
 
@@ -7,10 +7,10 @@ use lager_wire::{LineReading, Payload, Setting, SettingKey, SettingReply, Settin
 
 use crate::support::Robot;
 
-/// Bytes of EEPROM the boards use.
+/// How many bytes of EEPROM the boards use.
 const USED: usize = 64;
 
-/// Sends a setting to the steering board; its answer.
+/// Sends a setting to the steering board and returns its answer.
 fn set(robot: &mut Robot, value: i16) -> SettingReply {
     let setting = Setting {
         key: SettingKey::GainP,
@@ -33,14 +33,14 @@ fn set(robot: &mut Robot, value: i16) -> SettingReply {
     answer.expect("the board answers")
 }
 
-/// The gain in force, found out by asking for one that no board has.
+/// The gain in force: the board answers an impossible gain with it.
 fn in_force(robot: &mut Robot) -> i16 {
     let reply = set(robot, 300);
     assert_eq!(reply.status, SettingStatus::OutOfRange);
     reply.value
 }
 
-/// A robot whose steering board begins with this EEPROM.
+/// A robot whose steering board starts with this EEPROM.
 fn with_eeprom(content: &[u8]) -> Robot {
     let mut robot = Robot::new(2);
     robot.rig.chip(Board::Steering).set_eeprom(content);
@@ -98,10 +98,10 @@ fn while_the_line_sensors_are_calibrated_each_tells_in_turn_what_it_has_read() {
         assert_eq!(usize::from(reading.sensor), place % 11);
         assert!((reading.lowest..=reading.highest).contains(&reading.reading));
     }
-    // Its middle is over the tape.
+    // The sensor in the middle is over the tape.
     let [edge, middle] = [0, 5].map(|sensor| readings[sensor].reading);
     assert!(middle > edge, "{middle} {edge}");
-    // A distance is told between them.
+    // A distance comes between two readings.
     let distances = told.filter(|packet| matches!(packet.payload, Payload::Distance(_)));
     assert!(distances.count() >= readings.len() - 2);
 }

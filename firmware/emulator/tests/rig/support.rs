@@ -1,4 +1,4 @@
-//! A rig on the real images, and a Pi at each end.
+//! A rig on the real images with a Pi at each end.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -10,11 +10,11 @@ use lager_emulator::rig::{Board, Images, Rig, RigOptions};
 use lager_plant::{Make, Pose, Warehouse};
 use lager_wire::{BoardStatus, Command, Payload, SteerData, WheelCommand};
 
-/// The default baud rate of the Pi's lines, and the original's.
+/// The default baud rate of the Pi's lines, and the original robot's.
 pub(crate) const FAST: u32 = 500_000;
 pub(crate) const SLOW: u32 = 9_600;
 
-/// Where `firmware/avr` puts its images, unless the environment says otherwise.
+/// The folder of the images: that of `firmware/avr`, or the one that LAGER_IMAGES names.
 fn folder() -> PathBuf {
     std::env::var_os("LAGER_IMAGES").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../avr/target/images"),
@@ -31,7 +31,7 @@ fn read(folder: &Path) -> Images {
     }
 }
 
-/// The images for a baud rate, read once.
+/// The images for a baud rate; they are read once.
 fn images(baud: u32) -> &'static Images {
     static FAST_ONES: OnceLock<Images> = OnceLock::new();
     static SLOW_ONES: OnceLock<Images> = OnceLock::new();
@@ -41,7 +41,7 @@ fn images(baud: u32) -> &'static Images {
     }
 }
 
-/// How the tests build their robot.
+/// Options of the tests' robot.
 fn options(seed: u64, baud: u32) -> RigOptions {
     RigOptions {
         warehouse: Warehouse::builtin("small").expect("it is built in"),
@@ -51,7 +51,7 @@ fn options(seed: u64, baud: u32) -> RigOptions {
     }
 }
 
-/// The robot and the Pi.
+/// The robot, and the Pi's two ends.
 pub(crate) struct Robot {
     pub(crate) rig: Rig,
     pub(crate) sensor: Pi,
@@ -59,12 +59,12 @@ pub(crate) struct Robot {
 }
 
 impl Robot {
-    /// Power comes on.
+    /// A robot whose power comes on now, at the default baud rate.
     pub(crate) fn new(seed: u64) -> Self {
         Self::at(FAST, seed)
     }
 
-    /// The same with the lines to the Pi at another baud rate.
+    /// A robot whose lines to the Pi have another baud rate.
     pub(crate) fn at(baud: u32, seed: u64) -> Self {
         Self {
             rig: Rig::new(images(baud), &options(seed, baud)).expect("the rig is sound"),
@@ -73,7 +73,7 @@ impl Robot {
         }
     }
 
-    /// Power is on and both boards have shaken hands, with the Pi and with each other.
+    /// A robot whose boards have shaken hands with the Pi and with each other.
     pub(crate) fn up(seed: u64) -> Self {
         let mut robot = Self::new(seed);
         robot.run(Duration::from_millis(500));
@@ -81,7 +81,7 @@ impl Robot {
         robot
     }
 
-    /// Up, and driving straight ahead without looking at the line.
+    /// A connected robot that drives straight ahead without following the line.
     pub(crate) fn driving(seed: u64) -> Self {
         let mut robot = Self::up(seed);
         robot.wheels(WheelCommand::ManualForward);
@@ -90,7 +90,7 @@ impl Robot {
         robot
     }
 
-    /// The robot on its first edge, this far left of the line.
+    /// Puts the robot on its first edge, this far to the left of the line, in mm.
     pub(crate) fn place(&mut self, left: f64) {
         let pose = Pose {
             x: 60.0,
@@ -112,7 +112,7 @@ impl Robot {
         );
     }
 
-    /// Runs until both motors are off; the cycle of that, at most `limit` ahead.
+    /// Runs until both motors are off, at most for `limit`. Returns the cycle of that.
     pub(crate) fn run_until_off(&mut self, limit: Duration) -> Option<u64> {
         self.rig.take_motor_changes();
         self.run(limit);
@@ -128,7 +128,7 @@ impl Robot {
         self.steering.steer_data().expect("there was a report")
     }
 
-    /// Runs until the steering board tells how it is, and that.
+    /// Runs until the steering board sends its status, and returns it.
     pub(crate) fn steering_status(&mut self) -> BoardStatus {
         self.steering.packets.clear();
         self.run(Duration::from_millis(1_100));
@@ -136,7 +136,7 @@ impl Robot {
     }
 }
 
-/// The latest board status that has arrived.
+/// The latest board status from a board.
 pub(crate) fn status(pi: &Pi) -> Option<BoardStatus> {
     pi.packets
         .iter()
@@ -147,7 +147,7 @@ pub(crate) fn status(pi: &Pi) -> Option<BoardStatus> {
         })
 }
 
-/// Cycles of so many milliseconds.
+/// This many milliseconds, in cycles.
 pub(crate) const fn milliseconds(count: u64) -> u64 {
     FREQUENCY * count / 1_000
 }

@@ -1,6 +1,6 @@
-//! One AX-12: its control table, how it moves, and what it answers.
+//! One AX-12: its control table, its movement and its answers.
 //!
-//! It knows nothing of the wire; see the module above.
+//! It knows nothing of the wire, which the parent module models.
 
 use lager_ax12::table::{
     BAUD_1_MBIT, BAUD_RATE, CCW_ANGLE_LIMIT_L, CW_ANGLE_LIMIT_L, DEFAULT_RETURN_DELAY, FULL_SPEED,
@@ -11,11 +11,11 @@ use lager_ax12::table::{
 };
 use lager_ax12::{ErrorBits, Instruction};
 
-/// Units of position per second at full speed: 59 revolutions a minute, 1023 units to 300 degrees.
+/// Units of position a second at full speed: 59 rpm, 1023 units in 300 degrees.
 const FULL_SPEED_UNITS: f64 = 59.0 * 6.0 * 1023.0 / 300.0;
-/// Units of position per second and unit of the goal speed: 0.111 revolutions a minute.
+/// Units of position a second for each unit of goal speed (0.111 rpm).
 const SPEED_UNIT: f64 = 0.111 * 6.0 * 1023.0 / 300.0;
-/// Distance from the goal at which a blocked servo pushes with all its torque (compliance slope).
+/// A blocked servo this far from its goal pushes with all its torque, in units (compliance slope).
 const SLOPE: f64 = 32.0;
 
 /// One servo.
@@ -24,13 +24,13 @@ pub(super) struct Servo {
     pub(super) table: [u8; LENGTH],
     registered: Option<(u8, Vec<u8>)>,
     pub(super) position: f64,
-    /// The lowest position the joint can get to now, when something is in the way.
+    /// The lowest position that the joint can reach now, because something is in the way.
     pub(super) stop: f64,
-    /// Where the joint sinks to without torque, and how many units in a second.
+    /// How the joint sinks without torque, if it does.
     pub(super) sags: Option<Sag>,
 }
 
-/// How a joint gives way without torque.
+/// Where a joint sinks to without torque, and how fast.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sag {
     pub(super) to: f64,
@@ -38,7 +38,7 @@ pub(super) struct Sag {
 }
 
 impl Servo {
-    /// A servo with the factory's values, at `position` and without torque.
+    /// A servo with the factory's values at `position`, without torque.
     pub(super) fn new(id: u8, position: u16) -> Self {
         let mut servo = Self {
             table: [0; LENGTH],
@@ -80,7 +80,7 @@ impl Servo {
         self.table[at..at + 2].copy_from_slice(&value.to_le_bytes());
     }
 
-    /// Has torque and its goal where it is.
+    /// Switches the torque on; the goal is `position`.
     pub(super) fn hold(&mut self, position: u16) {
         self.set_word(GOAL_POSITION_L, position);
         self.table[usize::from(TORQUE_ENABLE)] = 1;
@@ -91,7 +91,7 @@ impl Servo {
         self.table[usize::from(TORQUE_ENABLE)] != 0
     }
 
-    /// Sinks for `seconds` under what hangs on the joint.
+    /// Sinks for `seconds` under its load.
     pub(super) fn sag(&mut self, seconds: f64) {
         let Some(Sag { to, units_per_s }) = self.sags else {
             return;
@@ -122,7 +122,7 @@ impl Servo {
         let missing = goal - self.position;
         let blocked = goal < self.stop && self.position <= self.stop;
         let torque = f64::from(self.word(TORQUE_LIMIT_L).min(1023));
-        // A moving joint needs a little torque; a blocked one is pushed by the distance left.
+        // A moving joint needs a little torque; a blocked one pushes harder far from its goal.
         let load = if blocked {
             (missing / SLOPE * 1023.0).clamp(-torque, torque)
         } else {
@@ -131,7 +131,7 @@ impl Servo {
         self.publish((self.position - before) / seconds, load);
     }
 
-    /// It stands, and pushes against nothing; nothing to tell if the table says so already.
+    /// The servo stands without load; writes the table only if that is new.
     fn rest(&mut self) {
         let moves = self.table[usize::from(MOVING)] != 0;
         if moves || self.word(PRESENT_LOAD_L) != 0 {
@@ -139,7 +139,7 @@ impl Servo {
         }
     }
 
-    /// Writes what was measured into the table.
+    /// Writes the measured values into the table.
     pub(super) fn publish(&mut self, units_per_s: f64, load: f64) {
         self.set_word(PRESENT_POSITION_L, self.position.round() as u16);
         self.set_word(PRESENT_SPEED_L, unsigned((units_per_s / SPEED_UNIT) as i16));
@@ -147,7 +147,7 @@ impl Servo {
         self.table[usize::from(MOVING)] = u8::from(units_per_s != 0.0);
     }
 
-    /// Carries out an instruction; the errors and registers of the answer, if there is one.
+    /// Carries out an instruction. Returns the errors and registers of the answer, if there is one.
     pub(super) fn obey(
         &mut self,
         instruction: Option<Instruction>,

@@ -1,17 +1,17 @@
 //! The arm's AX-12 servos and the half-duplex wire they share with the steering board (A1).
 //!
-//! Each servo has the control table of the original's listing (A3) and answers the bytes it is
-//! sent as the real one does: after its return delay, at 1 Mbit/s, and not at all when it is
-//! broadcast to or its return level forbids it. It moves at its goal speed, and pushes harder
-//! the farther it is kept from its goal. Without torque, shoulder and elbow sink.
+//! Each servo has the control table of the original's listing (A3) and answers as the real one
+//! does: after its return delay, at 1 Mbit/s. It does not answer a broadcast, nor a packet that its
+//! return level excludes. It moves at its goal speed, and pushes harder the farther something keeps
+//! it from its goal. Without torque, shoulder and elbow sink.
 //!
 //! ```text
 //!  board  | FF FF id .. sum |
 //!  servo                      return delay  | FF FF id .. sum |      10 us a byte
 //! ```
-//! The board's own bytes are not echoed here: the owner of the wire mutes its receiver while it
-//! sends (AMB-26). Not modelled: heat, shutdown by overload, change of the baud rate. RESET is
-//! refused, because it would leave eight servos with one id.
+//! The board does not hear its own bytes here: the owner of the wire mutes the board's receiver
+//! while it sends (AMB-26). Not modelled: heat, shutdown by overload, change of the baud rate.
+//! RESET is refused, because it would give eight servos the same id.
 
 mod device;
 
@@ -26,21 +26,21 @@ use crate::arm::SERVOS;
 use crate::make::Make;
 use crate::noise::Noise;
 
-/// The joints that carry weight, as the indices of their two mirrored servos.
+/// The joints that carry weight, as the indices of their two servos.
 const PAIRS: [[usize; 2]; 2] = [[1, 2], [3, 4]];
-/// Where such a joint comes to lie, as the position of its first servo.
+/// Where such a joint rests without torque, as the position of its first servo.
 const LYING: f64 = 300.0;
-/// How fast it sinks, in units of position a second.
+/// How fast it sinks, at least and at most, in units of position a second.
 const SAGS: [f64; 2] = [10.0, 80.0];
 /// Time of one byte at 1 Mbit/s.
 const BYTE_NS: u64 = 10_000;
 
-/// What is wrong with one servo; nothing, by default.
+/// The faults of one servo; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ServoFault {
-    /// Errors it reports in every answer, beside those of the question.
+    /// Errors that it reports in every answer, besides those of the question.
     pub errors: ErrorBits,
-    /// Its answers arrive with a wrong checksum.
+    /// Whether its answers arrive with a wrong checksum.
     pub garbled: bool,
 }
 
@@ -70,7 +70,7 @@ impl ServoBus {
         }
     }
 
-    /// Servos whose joints sink without torque, as those of a worn arm do.
+    /// Servos whose joints sink without torque, as a worn arm's do.
     pub fn sagging(positions: [u16; SERVOS], mut noise: Noise, make: Make) -> Self {
         let mut bus = Self::new(positions);
         for [servo, mirrored] in PAIRS {
@@ -87,7 +87,7 @@ impl ServoBus {
     pub fn transmit(&mut self, now: Duration, bytes: &[u8]) {
         let now = nanoseconds(now);
         if now < self.free_ns && !self.replies.is_empty() {
-            // Both drive the wire: the rest of the answer is lost.
+            // Board and servo both drive the wire: the rest of the answer is lost.
             self.replies.retain(|(at, _)| *at <= now);
             self.collisions += 1;
         }
@@ -115,7 +115,7 @@ impl ServoBus {
         self.free_ns = self.free_ns.max(end);
     }
 
-    /// The next byte a servo has sent, once it has arrived.
+    /// The next byte from a servo, once it has arrived.
     pub fn receive(&mut self, now: Duration) -> Option<u8> {
         let (at, byte) = *self.replies.front()?;
         (at <= nanoseconds(now)).then(|| {
@@ -152,7 +152,7 @@ impl ServoBus {
         core::array::from_fn(|index| self.servos[index].position)
     }
 
-    /// Puts the servos somewhere, where they hold themselves with torque.
+    /// Moves the servos to these positions, where they hold with torque.
     pub fn set_positions(&mut self, positions: [u16; SERVOS]) {
         for (servo, position) in self.servos.iter_mut().zip(positions) {
             servo.position = f64::from(position);
@@ -167,7 +167,7 @@ impl ServoBus {
         }
     }
 
-    /// Makes servo `id` (1 to 8) ill, or well again.
+    /// Gives servo `id` (1 to 8) this fault; the default mends it.
     pub fn set_fault(&mut self, id: u8, fault: ServoFault) {
         if let Some(place) = self.faults.get_mut(usize::from(id).wrapping_sub(1)) {
             *place = fault;
@@ -180,7 +180,7 @@ impl ServoBus {
     }
 }
 
-/// Lets the servos act on a packet; the return delay in ns and the answer, if one answers.
+/// Lets the servos act on a packet. Returns the return delay in ns and the answer, if one answers.
 fn act(
     servos: &mut [Servo; SERVOS],
     present: &[bool; SERVOS],
@@ -420,7 +420,7 @@ mod tests {
         run(&mut bus, 1_000, 0.0);
         assert_eq!(bus.positions()[1], 500.0);
         assert_eq!(bus.positions()[2], held);
-        // The elbow goes on to where it lies.
+        // The elbow sinks to where it rests.
         run(&mut bus, 30_000, 0.0);
         assert_eq!(bus.positions()[3], LYING);
     }
@@ -435,7 +435,7 @@ mod tests {
         while let Some(byte) = bus.receive(Duration::from_millis(9)) {
             answer.push(byte);
         }
-        // One byte of the first answer had come; the second is whole.
+        // The first byte of the first answer had arrived; the second answer is complete.
         assert_eq!(answer, [0xFF, 0xFF, 0xFF, 0x02, 0x02, 0x00, 0xFB]);
     }
 }

@@ -1,20 +1,20 @@
-//! How far the wheels turn while a person drives, for services that must know whether the robot
-//! still stands where it stood.
+//! Counts how far the wheels turn while a person drives, for services that must know whether the
+//! robot has moved from its place.
 //!
-//! It is apart from the arbiter because it only counts and decides nothing. It is in the bridge
-//! because the bridge sees every report and outlives the services that want to know.
+//! This file stands apart because it only counts and decides nothing. It belongs to the bridge
+//! because the bridge sees every report and outlives the services that need the count.
 
 use core::time::Duration;
 
-/// How long a board's report is believed; it stops by itself when its command is this old.
-const REPORT_AGE: Duration = Duration::from_millis(150);
+use lager_wire::COMMAND_AGE;
 
-/// The duty of both motors of a board that does not report it, while it is told to move.
+/// The duty that counts for both motors of a board that does not report it, while it has a command
+/// to move.
 const STANDARD_DUTY: u64 = 200;
 
-/// The time that a bridge which is killed while a person drives has not reported: since its last
-/// `link/health`, plus the board's limit on a command's age.
-const UNTOLD: Duration = Duration::from_millis(100 + 150);
+/// The time that a bridge may not have counted if it was killed while a person drove: since its
+/// last `link/health`, plus the board's limit on a command's age.
+const UNTOLD: Duration = Duration::from_millis(100).saturating_add(COMMAND_AGE);
 
 /// Duty × µs, summed over both motors, whatever the direction.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,7 +26,7 @@ pub(super) struct Driven {
 }
 
 impl Driven {
-    /// Goes on from the sum of an earlier life, which ended while a person drove or not.
+    /// Continues the sum of an earlier bridge, which ended while a person drove or not.
     pub(super) fn resume(sum: u64, was_driven: bool) -> Self {
         let untold = if was_driven {
             STANDARD_DUTY.saturating_mul(micros(UNTOLD))
@@ -52,10 +52,10 @@ impl Driven {
     /// The board reports these duties.
     pub(super) fn report(&mut self, now: Duration, left: u8, right: u8) {
         self.duty = u64::from(left) + u64::from(right);
-        self.believed_until = now + REPORT_AGE;
+        self.believed_until = now + COMMAND_AGE;
     }
 
-    /// A board that does not report has been told to move, or to stand.
+    /// A board that does not report has a command to move, or to stand.
     pub(super) fn told(&mut self, moves: bool) {
         self.duty = if moves { STANDARD_DUTY } else { 0 };
         self.believed_until = Duration::MAX;

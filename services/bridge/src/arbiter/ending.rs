@@ -1,8 +1,8 @@
-//! How orders end: when their lease lapses, when the board reports it, by a stop or by a change of
-//! mode.
+//! How orders end: when their lease lapses, when the board reports their end, by a stop or by a
+//! change of mode.
 //!
-//! It is apart from the judgement of orders because no origin has to ask for an end. What is
-//! written to the board afterwards is `wire.rs`'s task.
+//! This file stands apart from the judgement of orders because no origin asks for these ends.
+//! `wire.rs` then writes to the board.
 
 use core::time::Duration;
 
@@ -12,7 +12,7 @@ use super::ledger::Ended;
 use super::{Arbiter, Grant, STANDBY};
 
 impl Arbiter {
-    /// Ends what runs, with nothing in its place.
+    /// Ends what runs, and puts nothing in its place.
     pub(super) fn quiet(&mut self) {
         self.grant = None;
         if self.running.is_some() {
@@ -28,7 +28,7 @@ impl Arbiter {
             return;
         };
         let by_person = over.key.origin == Origin::Operator;
-        // To stand is never too late, and logic stands by one order for as long as it likes.
+        // A command to stand is never too late, and logic stands by one order for any time.
         if over.command != STANDBY || finish == Finish::Refused || by_person {
             let key = over.key;
             self.ledger.enter(Ended { key, finish });
@@ -55,11 +55,11 @@ impl Arbiter {
     /// Ends every order that was not renewed before `at`.
     pub(super) fn expire(&mut self, at: Duration) {
         if self.grant.is_some_and(|grant| grant.lease.is_over(at)) {
-            // The operator moved the arm by logic's grant.
+            // The operator moved the arm by logic's permission.
             self.grant = None;
             self.lapse();
         }
-        // The standby below a guest may have lapsed as well.
+        // The standby below an arm order may have lapsed as well.
         for _ in 0..2 {
             if self
                 .running
@@ -70,7 +70,7 @@ impl Arbiter {
         }
     }
 
-    /// The order in force was not renewed.
+    /// Nobody has renewed the order in force.
     fn lapse(&mut self) {
         if self
             .running

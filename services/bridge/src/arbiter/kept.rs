@@ -1,28 +1,30 @@
-//! What outlives the arbiter: the state that a successor needs, as `link/health` carries it, and
-//! what `steering/state` says of orders.
+//! The state that a successor of the arbiter needs, as `link/health` carries it, and the part of
+//! `steering/state` about orders.
 //!
-//! It is apart from the arbiter because it decides nothing: what is written here is read here.
+//! This file stands apart because it decides nothing: it writes the state and reads it again.
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Health, Mode, Origin, Refusal, SteeringReport};
+use lager_orders::Mode;
+use lager_orders::lease::SETPOINT;
+use lager_topics::{Finish, Health, Origin, Refusal, SteeringReport};
 use lager_wire::Command;
 
 use super::driven::Driven;
-use super::lease::{LEASE, Lease};
+use super::lease::Lease;
 use super::ledger::{Ended, OrderKey};
 use super::{Arbiter, Grant, Running, moves};
 
 impl Arbiter {
-    /// Goes on where an earlier life of the bridge ended: mode, latch, counters, and which order
-    /// belongs to which sequence byte.
+    /// Goes on from the state of an earlier bridge: mode, stop, counters, and which order has which
+    /// sequence byte.
     ///
-    /// The state was published at `published` (robot time). Nothing is written for the order in
-    /// force until its origin renews it while the board is up. If that has not come about [`LEASE`]
-    /// after `published`, the order ends as any whose lease is over, and its id is used up: what has
-    /// stood meanwhile is not set in motion again. A one-shot is only looked for in the board's
-    /// reports, so it is given [`LEASE`] from now on. Until then the board's own limit of 150 ms
-    /// protects.
+    /// The state was published at `published` (robot time). The arbiter writes nothing for the
+    /// order in force until its origin renews it while the board is up. If that has not happened
+    /// [`SETPOINT`] after `published`, the order ends as any order whose lease is over, and its id
+    /// is used up: a robot that has stood meanwhile does not move again. The arbiter only looks for
+    /// a one-shot in the board's reports, so a one-shot gets [`SETPOINT`] from now on. Until then
+    /// the board's own limit of 150 ms protects.
     pub fn resume(kept: &Health, published: Duration) -> Self {
         let mut arbiter = Self {
             mode: kept.mode.get().unwrap_or(Mode::Manual),
@@ -40,8 +42,8 @@ impl Arbiter {
             let id = kept.refused_id;
             arbiter.refused = Some((OrderKey { origin, id }, refusal));
         }
-        // One setpoint may have been written and not published: its sequence byte is not used
-        // again.
+        // The earlier bridge may have written one more setpoint than it published: leave out its
+        // sequence byte.
         arbiter.next_seq();
         arbiter.idle_seq = arbiter.wire_seq;
         let finish = kept.finish.get().unwrap_or(Finish::None);
@@ -68,7 +70,7 @@ impl Arbiter {
                 command,
                 seq: kept.wire_seq,
                 arm_granted: false,
-                lease: Lease::Unclaimed((!command.is_one_shot()).then_some(published + LEASE)),
+                lease: Lease::Unclaimed((!command.is_one_shot()).then_some(published + SETPOINT)),
                 held_until: None,
                 written: Some(Duration::ZERO),
                 search: None,

@@ -1,20 +1,19 @@
-//! How long an order counts: the lease, from the last renewal by its origin.
+//! How long an order counts: its lease, which begins again with each renewal by its origin.
 //!
-//! It is apart from the arbiter because orders and grants both use it; it knows nothing of either.
+//! This file stands apart because orders and permissions both use it. It knows nothing of either.
 
 use core::time::Duration;
 
-/// How long an order holds after its origin's last renewal, in robot time.
-pub const LEASE: Duration = Duration::from_millis(120);
+use lager_orders::lease::SETPOINT;
 
 /// How long an order in force still holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lease {
     /// Until this moment.
     Until(Duration),
-    /// Taken up from an earlier life of the bridge: nothing is written for it until its origin
-    /// renews it, and it lapses at this moment. That of what is only looked for in the board's
-    /// reports is counted from the first `advance`.
+    /// Taken over from an earlier bridge: nothing is written for it until its origin renews it, and
+    /// it lapses at this moment. For a one-shot, which is only looked for in the board's reports,
+    /// the time counts from the first `advance`.
     Unclaimed(Option<Duration>),
 }
 
@@ -31,17 +30,18 @@ impl Lease {
     }
 
     pub(super) fn renew(&mut self, received: Duration) {
-        let end = received + LEASE;
+        let end = received + SETPOINT;
         *self = match *self {
             Self::Until(earlier) => Self::Until(earlier.max(end)),
             Self::Unclaimed(_) => Self::Until(end),
         };
     }
 
-    /// Gives an unclaimed lease its end, counted from the first moment the arbiter is told.
+    /// Gives a lease that was taken over its end, counted from the first moment that the arbiter
+    /// knows.
     pub(super) fn start(&mut self, now: Duration) {
         if *self == Self::Unclaimed(None) {
-            *self = Self::Unclaimed(Some(now + LEASE));
+            *self = Self::Unclaimed(Some(now + SETPOINT));
         }
     }
 }

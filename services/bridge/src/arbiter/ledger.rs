@@ -1,13 +1,13 @@
-//! The memory of ended orders. It makes sure that each order is executed exactly once.
+//! Remembers ended orders, so that each order is executed exactly once.
 //!
-//! An order is known by its origin and id. Origins renew an order until they hear how it ended,
-//! and a report can be missed, so a renewal of an ended order must be recognised, answered with
-//! the same end and never carried out again. The ledger is a ring of fixed size: it never
-//! allocates and forgets the oldest first.
+//! Origin and id name an order. Origins renew an order until they hear how it ended, and they can
+//! miss a report. So the arbiter must recognise a renewal of an ended order, answer with the same
+//! end, and never carry it out again. The ledger is a ring of fixed size: it never allocates, and
+//! forgets the oldest first.
 
 use lager_topics::{Finish, Origin};
 
-/// What tells one order from another.
+/// Origin and id of an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OrderKey {
     /// On whose behalf the order was given.
@@ -21,13 +21,13 @@ pub struct OrderKey {
 pub struct Ended {
     /// Which order.
     pub key: OrderKey,
-    /// How it ended; [`Finish::None`] for a setpoint that a newer order replaced, whose end is
-    /// reported to no one.
+    /// How it ended. [`Finish::None`] for a setpoint that a newer order replaced; nobody is told of
+    /// that end.
     pub finish: Finish,
 }
 
-/// Orders remembered: more than all origins together can have on their way at one time (eight
-/// publishers).
+/// How many orders it remembers: more than all eight publishers together can have on their way at
+/// one time.
 const CAPACITY: usize = 16;
 
 /// The orders that ended last.
@@ -38,7 +38,7 @@ pub(super) struct Ledger {
 }
 
 impl Ledger {
-    /// Enters an ended order, over the oldest entry or over an earlier one of the same order.
+    /// Adds an ended order, over an earlier entry of the same order or over the oldest entry.
     pub(super) fn enter(&mut self, ended: Ended) {
         let known = self
             .entries

@@ -1,9 +1,9 @@
-//! Who may steer: the one place where orders of several origins become one stream of commands.
+//! Who may steer: only here orders of several origins become one stream of commands.
 //!
-//! It is apart from the shell so that it can be proven: it is pure, owns no port and no clock, and
-//! takes robot time as an argument. So all of it is tested in virtual time, and the simulation in
-//! one process runs the same code. It does not decide what the robot should do. It decides whose
-//! order is obeyed, and ends an order when its origin is gone.
+//! The arbiter stands apart from the shell so that it can be proven: it is pure, owns no port and
+//! no clock, and takes robot time as an argument. So tests run all of it in virtual time, and the
+//! simulation in one process runs the same code. It does not decide what the robot should do. It
+//! decides whose order the bridge obeys, and ends an order when its origin is gone.
 //!
 //! ```text
 //!                 new id, allowed                     lease over, mode changed, stop
@@ -15,39 +15,40 @@
 //!                                        +-----------------> running
 //! ```
 //!
-//! * **Identity**: `(origin, id)`. The same id renews an order, a new id is executed. An id that
-//!   has ended is never executed again; the arbiter only reports its end again.
-//! * **Lease**: [`LEASE`] from the moment given with the order. Only the order's own renewals
-//!   extend it.
+//! * **Identity**: `(origin, id)`. The same id renews an order, a new id is executed. The arbiter
+//!   never executes an id again that has ended; it only reports its end again.
+//! * **Lease**: [`SETPOINT`](lager_orders::lease::SETPOINT), from the moment that comes with the
+//!   order. Only renewals of the same order extend it.
 //! * **Setpoints and one-shots**: a setpoint (drive, standby) is a level. A one-shot (turn, arm
 //!   step) is an event: however it ended, its id is used up.
-//! * **Nothing comes back by itself.** An order that has ended for any reason (lease, stop, mode, a
-//!   board that was reset or away, a pause of this process, the death of the one before) has its id
-//!   used up, and a renewal moves nothing, whoever gave it. Its origin hears the end, looks, and
-//!   gives a new one.
-//! * **Nothing comes late.** An order begins within [`STALE`] of the moment when its person gave it
-//!   or logic sent it last, or never. A person's order that is not allowed at once is used up, too;
-//!   logic's may begin once it is allowed.
-//! * **No motion unseen**: unless the steering board has reported within [`REPORT_DEADLINE`], every
-//!   order that moves something ends, and no origin may move anything. An original board does not
-//!   report and has no limit on a command's age. So it gets only standby, unless the configuration
-//!   accepts the risk ([`Arbiter::drive_original_boards`]).
-//! * **The newest order takes over**, as the board's command register has it (T2). A one-shot
-//!   that is replaced while it runs is reported as aborted; queueing is the external computer's
-//!   task (C5).
-//! * **Stop** latches until [`Arbiter::resume_from_stop`]; standby is repeated meanwhile, to an
-//!   original board as well.
-//! * **Mode**: in manual mode the operator drives and logic is ignored; in autonomous mode logic
-//!   drives and the operator may stop, and may move the arm while logic's order in force is a
-//!   standby with `arm_granted` (L10). Quarter turns and the drop are logic's alone (AMB-2,
+//! * **Nothing comes back by itself.** Whatever ended an order (lease, stop, mode, a board that was
+//!   reset or away, a pause of this process, the death of the bridge before), its id is used up,
+//!   and a renewal moves nothing. Its origin hears the end, looks, and gives a new order.
+//! * **Nothing comes late.** An order begins within
+//!   [`LATEST_MOVE`](lager_orders::lease::LATEST_MOVE) of the moment when a person gave it or logic
+//!   sent it last, or never. If a person's order is not allowed at once, its id is used up, too;
+//!   logic's order may begin once it is allowed.
+//! * **No motion unseen**: if the steering board has not reported within
+//!   [`UNHEARD`](lager_orders::lease::UNHEARD), every order that moves something ends, and no
+//!   origin may move anything. An original board does not report and has no limit on a command's
+//!   age. So it gets only standby, unless the configuration accepts the risk
+//!   ([`Arbiter::drive_original_boards`]).
+//! * **The newest order takes over**, as in the board's command register (T2). A one-shot that is
+//!   replaced while it runs counts as aborted. The external computer queues commands (C5), not the
+//!   bridge.
+//! * **Stop** lasts until [`Arbiter::resume_from_stop`]. Meanwhile the arbiter repeats standby, to
+//!   an original board as well.
+//! * **Mode**: in manual mode the operator drives and logic is ignored. In autonomous mode logic
+//!   drives and the operator may stop the robot, and may move the arm while logic's order in force
+//!   is a standby with `arm_granted` (L10). Only logic may give quarter turns and the drop (AMB-2,
 //!   AMB-27). An arm order while a wheel command moves the robot is refused (AMB-28).
-//! * **The arm waits for its profile**: an arm order is held until the steering board has accepted
-//!   its limits, and refused where the board does not take them.
+//! * **The arm waits for its profile**: the arbiter holds an arm order until the steering board has
+//!   accepted its limits, and refuses it if the board does not take them.
 //! * **Following may end**: the board gives it up by itself when it has lost its line. That ends
 //!   the order; only a new id follows again.
-//! * **Sequence bytes** are 1..=255; a one-shot never gets the one the board last reported as
-//!   finished. The board tells the same sequence byte from a new one, so a re-sent command renews
-//!   and does not repeat.
+//! * **Sequence bytes** are 1..=255. A one-shot never gets the one that the board last reported as
+//!   finished. For the board the same sequence byte is the same command, so a command that is sent
+//!   again is a renewal and not a repetition.
 
 mod driven;
 mod ending;
@@ -63,34 +64,22 @@ mod wire;
 
 use core::time::Duration;
 
-use lager_topics::{Mode, Refusal};
+use lager_orders::Mode;
+use lager_topics::Refusal;
 use lager_wire::{Command, SteerCommand, Version, WheelCommand};
 
 use driven::Driven;
-pub use lease::LEASE;
 use lease::Lease;
 use ledger::Ledger;
 pub use ledger::{Ended, OrderKey};
 pub use verdict::Verdict;
 
-/// How long the steering board may be silent before no origin may move anything, in robot time.
-pub const REPORT_DEADLINE: Duration = Duration::from_millis(200);
-
-/// The time within which what moves the robot, or lets it move, must be read after it was given, in
-/// real time; later it is refused. A process that was held up for longer must not move the robot
-/// when it goes on.
-pub const STALE: Duration = Duration::from_millis(200);
-
-/// When the command in force is written again to a version-1 board at the latest, so that its age
-/// stays below the board's limit of 150 ms.
-pub const RESEND: Duration = Duration::from_millis(40);
-
-/// Whether the arm may be moved.
+/// Whether the arm may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArmGate {
     /// It may.
     Open,
-    /// Not yet: the board is being told its limits.
+    /// Not yet: the bridge is telling the board its limits.
     Held,
     /// No: the board does not take them.
     Shut,
@@ -104,12 +93,12 @@ struct Running {
     seq: u8,
     arm_granted: bool,
     lease: Lease,
-    /// Standby is written until then, so that the board has unlocked its arm.
+    /// Until then standby is written, so that the board has unlocked its arm.
     held_until: Option<Duration>,
     /// When it was first written.
     written: Option<Duration>,
-    /// Set while a one-shot that was written before the link came up has to be found again in
-    /// the board's reports.
+    /// Set while the arbiter looks in the board's reports for a one-shot that was written before
+    /// the link came up.
     search: Option<Search>,
 }
 
@@ -120,7 +109,7 @@ struct Search {
     misses: u8,
 }
 
-/// Logic's granted standby, while an operator's arm order runs on top of it.
+/// Logic's standby that permits it, while an operator's arm order runs on top.
 #[derive(Clone, Copy, Debug)]
 struct Grant {
     /// `None` after a restart of the bridge, until logic has renewed it.
@@ -140,10 +129,10 @@ pub struct Arbiter {
     grant: Option<Grant>,
     last: Option<Ended>,
     ledger: Ledger,
-    /// Logic's order that was ignored last, and why, so that it is counted once.
+    /// Logic's last ignored order, and why, so that it counts once.
     ignored: Option<(OrderKey, Refusal)>,
     orders_refused: u32,
-    /// The order refused or ignored last, and why.
+    /// The last order that was refused or ignored, and why.
     refused: Option<(OrderKey, Refusal)>,
     leases_expired: u32,
     driven: Driven,
@@ -157,27 +146,27 @@ pub struct Arbiter {
     reported: Option<Duration>,
     /// The board is up and has not reported in time.
     silent: bool,
-    /// Why the board lets no origin move anything, when it was last looked at.
+    /// Why no origin may move anything, as the last check of the board showed.
     objection: Refusal,
     arm: ArmGate,
     /// An earlier life of this link is known, so the board knows our last sequence byte.
     acquainted: bool,
-    /// A standby to be written before anything else.
+    /// A standby to write before anything else.
     prelude: Option<SteerCommand>,
-    /// The sequence byte given out last.
+    /// The last sequence byte that was used.
     wire_seq: u8,
     /// The sequence byte of the standby that is written while nothing runs.
     idle_seq: u8,
-    /// What the board was last told in this life of the link.
+    /// The last command for the board in this life of the link.
     written: Option<SteerCommand>,
     /// When a standby or arm command followed a moving one on the wire.
     halted_at: Option<Duration>,
     next_send: Duration,
-    /// When a command that could not be written is tried again.
+    /// When to try again to write a command.
     retry_at: Option<Duration>,
     /// How long a packet takes on the wire.
     packet_time: Duration,
-    /// When what was written has left for the board.
+    /// When the last bytes have left for the board.
     wire_free: Duration,
     board_finished: Option<u8>,
 }
@@ -189,7 +178,7 @@ impl Default for Arbiter {
 }
 
 impl Arbiter {
-    /// A robot that has just been switched on: manual mode, no stop latched, nothing in force.
+    /// A robot that has just been switched on: manual mode, no stop, no order in force.
     pub fn new() -> Self {
         Self {
             mode: Mode::Manual,
@@ -227,29 +216,29 @@ impl Arbiter {
         }
     }
 
-    /// A packet takes so long on the wire, in robot time: orders that come faster are not all
-    /// written.
+    /// Sets how long a packet takes on the wire, in robot time. If orders come faster, not all of
+    /// them are written.
     pub fn pace(&mut self, packet_time: Duration) {
         self.packet_time = packet_time;
     }
 
-    /// Lets an original steering board be driven, which has no limit on a command's age: if this
-    /// process dies, such a board goes on with what it was told last.
+    /// Allows an original steering board to be driven. It has no limit on a command's age: if this
+    /// process dies, such a board goes on with its last command.
     pub fn drive_original_boards(&mut self, accepted: bool) {
         self.original_boards = accepted;
     }
 
-    /// The command in force is due now if it would be within `ahead`.
+    /// The command in force is due now if it would be due within `ahead`.
     pub fn resend_early(&mut self, now: Duration, ahead: Duration) {
         if self.next_send <= now + ahead {
             self.next_send = self.next_send.min(now);
         }
     }
 
-    /// Latches the stop: whatever runs is aborted, and nothing drives until
+    /// Sets the stop: whatever runs is aborted, and nothing drives until
     /// [`Arbiter::resume_from_stop`].
     ///
-    /// Standby is due at once, also where a stop is latched already or the driver took nothing.
+    /// Standby is due at once, also if a stop is in force already or the driver took nothing.
     pub fn stop(&mut self) {
         self.retry_at = None;
         self.next_send = Duration::ZERO;
@@ -260,7 +249,7 @@ impl Arbiter {
         }
     }
 
-    /// Releases the latch. Nothing moves by that alone: an origin must renew or give an order.
+    /// Releases the stop. That alone moves nothing: an origin must renew or give an order.
     pub fn resume_from_stop(&mut self) {
         if self.stopped {
             self.stopped = false;
@@ -280,9 +269,9 @@ impl Arbiter {
         }
     }
 
-    /// Lets time pass, once in each turn, after all that has come was handed in and before
-    /// [`Arbiter::poll`]: leases and the report's deadline end, and what the board's side waits
-    /// for.
+    /// Lets time pass, once in each turn, after everything that has come was handed in and before
+    /// [`Arbiter::poll`]: ends leases and the deadline of the reports, and what waits on the
+    /// board's side.
     pub fn advance(&mut self, now: Duration) {
         self.count_driven(now);
         self.watch_board(now);
@@ -296,18 +285,19 @@ impl Arbiter {
         self.advance_board(now);
     }
 
-    /// Counts what a person has driven until `now`.
+    /// Counts how far a person has driven until `now`.
     fn count_driven(&mut self, now: Duration) {
         self.driven.advance(now, self.mode == Mode::Manual);
     }
 
-    /// This process was held up for [`LEASE`] or longer until `now`: ends what was in force before,
-    /// whatever renewals have come meanwhile. To be called before they are handed in.
+    /// This process was held up for [`SETPOINT`](lager_orders::lease::SETPOINT) or longer until
+    /// `now`: ends the orders that were in force before, whatever renewals have come meanwhile.
+    /// Call it before those are handed in.
     pub fn wake(&mut self, now: Duration) {
         self.expire(now);
     }
 
-    /// Says whether the arm may be moved, from the next order on.
+    /// Sets whether the arm may move, from the next order on.
     pub fn set_arm_gate(&mut self, arm: ArmGate) {
         self.arm = arm;
     }
@@ -336,7 +326,8 @@ impl Arbiter {
         self.stopped
     }
 
-    /// Why no origin may move anything now; of the board as of the last [`Arbiter::advance`].
+    /// Why no origin may move anything now. The board's state is that of the last
+    /// [`Arbiter::advance`].
     pub fn blocked(&self) -> Refusal {
         if self.parked {
             Refusal::ShuttingDown
@@ -352,21 +343,21 @@ impl Arbiter {
         self.running.map(|running| (running.key, running.command))
     }
 
-    /// Whether the order in force is a setpoint: written once more it is the same.
+    /// Whether the order in force is a setpoint, which may be written twice.
     pub fn has_setpoint(&self) -> bool {
         self.running
             .is_some_and(|running| !running.command.is_one_shot())
     }
 
-    /// The order that ended last, of those whose end is news.
+    /// The last ended order whose end must be reported.
     pub fn last_ended(&self) -> Option<Ended> {
         self.last
     }
 
-    /// Grows whenever something has changed that [`Arbiter::fill`] writes, except for the lease.
+    /// Grows with every change of what [`Arbiter::fill`] writes, except for the lease.
     ///
-    /// Publish before writing to the wire when it has grown: then the successor of a bridge that is
-    /// killed between the two learns from the board whether the order was carried out. Only where a
+    /// When it has grown, publish before you write to the wire. If the bridge is killed between the
+    /// two, its successor learns from the board whether the order was carried out. Only if a
     /// setpoint has replaced a setpoint and nothing else has changed, one write may come before.
     pub fn revision(&self) -> u32 {
         self.revision

@@ -1,24 +1,27 @@
-//! Which orders are obeyed: the judgement of orders.
+//! Judges orders: decides which of them the bridge obeys.
 //!
-//! It is apart from the arbiter's other side, the wire. It does not know how a command gets to a
-//! board, only which origin may give it, what it replaces, and that it ends with its origin.
+//! This file stands apart from the arbiter's other side, the wire. It does not know how a command
+//! gets to a board. It knows which origin may give it, what it replaces, and that it ends with its
+//! origin.
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Mode, Origin, Refusal, SteeringOrder};
+use lager_orders::Mode;
+use lager_orders::lease::LATEST_MOVE;
+use lager_topics::{Finish, Origin, Refusal, SteeringOrder};
 use lager_wire::{ArmCommand, Command, WheelCommand};
 
 use super::lease::Lease;
 use super::ledger::{Ended, OrderKey};
 use super::verdict::Verdict;
-use super::{Arbiter, ArmGate, Grant, Running, STALE, STANDBY, moves};
+use super::{Arbiter, ArmGate, Grant, Running, STANDBY, moves};
 
 impl Arbiter {
-    /// Takes one order that its origin sent at `sent` (robot time, at most the present). It is as
-    /// old as `age` says (real time): since a person first gave it, or since logic sent it.
+    /// Takes one order that its origin sent at `sent` (robot time, at most the present). `age`
+    /// (real time) is its age: since a person first gave it, or since logic sent it.
     ///
-    /// Hand in everything that has arrived before asking [`Arbiter::poll`] for what to write:
-    /// then of several setpoints only the last is written.
+    /// Hand in everything that has arrived before you ask [`Arbiter::poll`] what to write. Then
+    /// only the last of several setpoints is written.
     pub fn order(&mut self, sent: Duration, age: Duration, order: &SteeringOrder) -> Verdict {
         // Judge it against the order that was in force when it was sent.
         self.expire(sent);
@@ -52,7 +55,7 @@ impl Arbiter {
         Verdict::Executes
     }
 
-    /// Renews the order in force or the grant below it; `None` if `key` is neither.
+    /// Renews the order in force or the standby below it; `None` if `key` is neither.
     fn renew(
         &mut self,
         received: Duration,
@@ -67,7 +70,7 @@ impl Arbiter {
             running.arm_granted = order.arm_granted != 0;
             let claimed = matches!(running.lease, Lease::Unclaimed(_));
             if claimed && self.board.is_none() && !running.command.is_one_shot() {
-                // Nothing can be written for it yet, and it must not lie in wait for the board.
+                // Nothing can be written for it yet, and it must not wait for the board.
                 return Some(Verdict::Renewed);
             }
             running.lease.renew(received);
@@ -96,7 +99,7 @@ impl Arbiter {
         Some(Verdict::Renewed)
     }
 
-    /// Why an order that is not in force and has not ended is refused or ignored, if it is.
+    /// Why an order that is not in force and has not ended is refused or ignored, if so.
     fn objection(
         &mut self,
         sent: Duration,
@@ -124,7 +127,7 @@ impl Arbiter {
             Refusal::NotInCharge
         } else if self.stopped {
             Refusal::StopLatched
-        } else if moves_it && age > STALE {
+        } else if moves_it && age > LATEST_MOVE {
             Refusal::Stale
         } else if let Some(why) = board {
             why
@@ -143,7 +146,7 @@ impl Arbiter {
     }
 
     /// Whether the order in force ends when the steering board comes up again. A person's order
-    /// does, unless it was taken over from an earlier bridge and the board has not been reset.
+    /// does, unless it was taken over from an earlier bridge and the board was not reset.
     pub(super) fn ends_with_the_link(&self, rebooted: bool) -> bool {
         let by_person = |running: Running| running.key.origin == Origin::Operator;
         (rebooted || self.has_met_board) && self.running.is_some_and(by_person)
@@ -198,7 +201,7 @@ impl Arbiter {
         }
     }
 
-    /// Tells again how an order ended, for an origin that goes on renewing it.
+    /// Reports again how an order ended, for an origin that goes on renewing it.
     fn tell(&mut self, ended: Ended) {
         if ended.finish != Finish::None && self.last != Some(ended) {
             self.last = Some(ended);

@@ -1,5 +1,5 @@
-//! No order moves the robot unseen: what the arbiter does when the steering board does not report,
-//! is absent, or is one that must not be driven.
+//! No order moves the robot unseen: what the arbiter does if the steering board does not report, is
+//! absent, or must not be driven.
 //!
 //! ```text
 //!            report                     200 ms without a report
@@ -8,14 +8,16 @@
 //!    +------------------------- report ---------------------------------+    all else is refused
 //! ```
 //!
-//! It is apart from the wire's side because it decides for all origins alike and writes nothing.
+//! This file stands apart from the wire's side because it decides for all origins alike and writes
+//! nothing.
 
 use core::time::Duration;
 
+use lager_orders::lease::UNHEARD;
 use lager_topics::{Finish, Refusal};
 use lager_wire::Version;
 
-use super::{Arbiter, REPORT_DEADLINE, STANDBY};
+use super::{Arbiter, STANDBY};
 
 impl Arbiter {
     /// Why the steering board lets no origin move anything.
@@ -29,11 +31,11 @@ impl Arbiter {
 
     fn is_unheard(&self, now: Duration) -> bool {
         self.reported
-            .is_none_or(|reported| reported + REPORT_DEADLINE <= now)
+            .is_none_or(|reported| reported + UNHEARD <= now)
     }
 
-    /// Ends every order that moves something while no board shows it, and notes why no origin may
-    /// move.
+    /// Ends every order that moves something while no board shows it, and keeps the reason why no
+    /// origin may move anything.
     pub(super) fn watch_board(&mut self, now: Duration) {
         let objection = self.board_objection(now);
         self.silent = objection == Some(Refusal::BoardSilent);
@@ -58,7 +60,7 @@ impl Arbiter {
         }
     }
 
-    /// When silence has to be noticed, if no report comes before.
+    /// When the silence must be noticed, if no report comes before.
     pub(super) fn silence_due(&self) -> Option<Duration> {
         let is_awaited = match self.board {
             None => self
@@ -68,6 +70,6 @@ impl Arbiter {
             Some(Version::Original) => false,
         };
         let reported = self.reported.filter(|_| is_awaited)?;
-        Some(reported + REPORT_DEADLINE)
+        Some(reported + UNHEARD)
     }
 }

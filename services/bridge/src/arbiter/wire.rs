@@ -1,42 +1,43 @@
-//! The arbiter's other side: what is written to the steering board, and what its reports mean.
+//! The arbiter's other side: what it writes to the steering board, and what the board's reports
+//! mean.
 //!
-//! It is apart from the judgement of orders because it knows the board (its version, its flags,
-//! its sequence bytes) and nothing of origins and modes.
+//! This file stands apart from the judgement of orders because it knows the board (its version, its
+//! flags, its sequence bytes) and nothing of origins and modes.
 
 use core::time::Duration;
 
+use lager_orders::lease::{RENEWAL, SETPOINT};
 use lager_topics::Finish;
-use lager_wire::{ArmCommand, Command, SteerCommand, SteerData, SteerFlags, Version, WheelCommand};
+use lager_wire::{
+    ArmCommand, COMMAND_AGE, Command, SteerCommand, SteerData, SteerFlags, Version, WheelCommand,
+};
 
-use super::lease::{LEASE, Lease};
+use super::lease::Lease;
 use super::ledger::OrderKey;
-use super::{Arbiter, ArmGate, RESEND, Running, STANDBY, Search, moves};
+use super::{Arbiter, ArmGate, Running, STANDBY, Search, moves};
 
-/// How long the wheels are in standby on the wire before an arm command follows: the board
-/// unlocks its arm in standby only (T4), and one pass of its loop must have seen it.
+/// How long the wheels are in standby on the wire before an arm command follows. The board unlocks
+/// its arm only in standby (T4), and one pass of its loop must have seen the standby.
 const ARM_UNLOCK: Duration = Duration::from_millis(20);
 
-/// The board's limit on a command's age.
-const COMMAND_AGE: Duration = Duration::from_millis(150);
-
-/// How long a one-shot may stay unseen in the reports of a board that was away.
+/// How long a one-shot may be missing in the reports of a board that was away.
 const SEARCH: Duration = Duration::from_millis(200);
 
-/// Reports without a trace of a one-shot that prove it is gone.
+/// After this many reports without the one-shot it is certainly gone.
 const MISSES: u8 = 2;
 
-/// When a command the driver did not take is tried again.
+/// After this time the bridge tries a command again that the driver did not take.
 const RETRY: Duration = Duration::from_millis(5);
 
 /// How often standby is written while the bridge shuts down.
 const PARKED_RESEND: Duration = Duration::from_millis(20);
 
 impl Arbiter {
-    /// The steering board's link is up. `rebooted`: the board has lost what it was told.
+    /// The steering board's link is up. `rebooted`: the board has forgotten its commands.
     ///
-    /// Logic's setpoint goes on under a new sequence byte. A person's setpoint ends, unless it was
-    /// taken over from an earlier bridge and the board has not been reset. A one-shot that was
-    /// written is not written again: it is searched for in the board's reports, and aborted if it
+    /// Logic's setpoint goes on with a new sequence byte. A person's setpoint ends, unless it was
+    /// taken over from an earlier bridge and the board was not reset. A one-shot that was written
+    /// is not written again: the arbiter looks for it in the board's reports, and aborts it if it
     /// is not there.
     pub fn board_up(&mut self, now: Duration, version: Version, rebooted: bool) {
         let ends = self.ends_with_the_link(rebooted);
@@ -74,16 +75,16 @@ impl Arbiter {
         self.revision = self.revision.wrapping_add(1);
     }
 
-    /// The steering board's link is down: nothing can be written.
+    /// The steering board's link is down, so nothing can be written.
     pub fn board_down(&mut self) {
         self.board = None;
         self.prelude = None;
         self.retry_at = None;
     }
 
-    /// Takes a report of the steering board: its last finished sequence byte becomes the end of
-    /// an order. The reports of an original board show that it is there; what they say is not
-    /// documented and is ignored.
+    /// Takes a report of the steering board. Its last finished sequence byte becomes the end of an
+    /// order. The reports of an original board only show that it is there; nobody has documented
+    /// their content.
     pub fn observe(&mut self, now: Duration, report: &SteerData) {
         if self.board.is_none() {
             return;
@@ -129,14 +130,14 @@ impl Arbiter {
         let failsafe = report.flags.contains(SteerFlags::FAILSAFE) && moves(running.command);
         let old = |written| now.saturating_sub(written) >= COMMAND_AGE;
         if failsafe && !running.command.is_one_shot() && running.written.is_some_and(old) {
-            // The board gave the command up for its age and stands. It does not set off again by
-            // an order that was given before.
+            // The board gave the command up because of its age, and stands. An order that was given
+            // before does not start it again.
             self.finish_running(Finish::Aborted);
         }
     }
 
     /// Lets time pass on the board's side: held arm orders are released, an original board's
-    /// one-shots count as done, and one-shots that were searched for in vain as lost.
+    /// one-shots count as done, and one-shots that were not found count as lost.
     pub(super) fn advance_board(&mut self, now: Duration) {
         let Some(running) = self.running.as_mut() else {
             return;
@@ -153,17 +154,16 @@ impl Arbiter {
         }
     }
 
-    /// What to write now, if anything; ask again until there is nothing. Time has passed before, by
-    /// [`Arbiter::advance`].
+    /// What to write now. Ask again until it returns nothing. Call [`Arbiter::advance`] before.
     ///
-    /// A version-1 board gets a change at once, and the command in force again after [`RESEND`], or
-    /// a little sooner ([`Arbiter::resend_early`]). An original board would carry out a repetition,
-    /// so it gets each command once. Standby it gets as often as the other, because nothing else
-    /// makes it stand.
+    /// A version-1 board gets a change at once, and the command in force again after [`RENEWAL`],
+    /// or a little sooner ([`Arbiter::resend_early`]). An original board would carry out a repeated
+    /// command again, so it gets each command once. Only standby is repeated, because nothing else
+    /// makes such a board stand.
     ///
-    /// Only a standby that ends a movement is written while a packet is on the wire. Whoever orders
-    /// faster than the wire carries would fill the driver's buffer otherwise, and a standby would
-    /// have to wait behind it: 4 KiB take 80 ms at 500 000 Bd, and 4 s at 9600.
+    /// While a packet is on the wire, only a standby that ends a movement may be written. Otherwise
+    /// an origin that gives orders faster than the wire carries them would fill the driver's
+    /// buffer, and a standby would wait behind it: 4 KiB take 80 ms at 500 000 Bd, and 4 s at 9600.
     pub fn poll(&mut self, now: Duration) -> Option<SteerCommand> {
         let version = self.board?;
         if self.retry_at.is_some_and(|at| at > now) {
@@ -194,7 +194,7 @@ impl Arbiter {
         }
         self.written = Some(command);
         self.wire_free = self.wire_free.max(now) + self.packet_time;
-        self.next_send = now + if self.parked { PARKED_RESEND } else { RESEND };
+        self.next_send = now + if self.parked { PARKED_RESEND } else { RENEWAL };
         let held = self.is_held();
         if let Some(running) = self.running.as_mut()
             && !held
@@ -204,13 +204,13 @@ impl Arbiter {
         Some(command)
     }
 
-    /// What [`Arbiter::poll`] gave last could not be written: it is given again shortly.
+    /// The last result of [`Arbiter::poll`] could not be written: it comes again shortly.
     pub fn not_written(&mut self, now: Duration) {
         self.wire_free = self.wire_free.saturating_sub(self.packet_time);
         self.retry_at = Some(now + RETRY);
     }
 
-    /// When [`Arbiter::poll`] next returns something, if no order or report comes before; a time in
+    /// When [`Arbiter::poll`] next returns something, if no order or report comes before. A time in
     /// the past means now.
     pub fn next_due(&self) -> Option<Duration> {
         let running = self.running.as_ref();
@@ -259,7 +259,7 @@ impl Arbiter {
         let mut held_until = None;
         if matches!(command, Command::Arm(_)) {
             if self.written.is_some_and(|written| code_moves(written.code)) {
-                // The standby between was superseded before it was written.
+                // The standby between them was replaced before it was written.
                 self.idle_seq = self.next_seq();
                 held_until = Some(received + ARM_UNLOCK);
             } else if let Some(halted_at) = self.halted_at {
@@ -271,7 +271,7 @@ impl Arbiter {
             command,
             seq: self.next_seq(),
             arm_granted,
-            lease: Lease::Until(received + LEASE),
+            lease: Lease::Until(received + SETPOINT),
             held_until,
             written: None,
             search: None,
@@ -279,7 +279,7 @@ impl Arbiter {
         self.revision = self.revision.wrapping_add(1);
     }
 
-    /// Puts a standby of `key` in force that the board has been told, or is about to be.
+    /// Puts a standby of `key` in force that the board has, or is about to get.
     pub(super) fn stand_for(&mut self, key: OrderKey, lease: Lease) {
         self.running = Some(Running {
             key,
@@ -293,12 +293,12 @@ impl Arbiter {
         });
     }
 
-    /// Nothing runs any more: the board is told a standby that is new to it.
+    /// Nothing runs any more: the board gets a standby that is new to it.
     pub(super) fn stand_anew(&mut self) {
         self.idle_seq = self.next_seq();
     }
 
-    /// The standby that has ended is the one that is still sent to the board.
+    /// The board still gets the standby that has ended.
     pub(super) fn stand_on(&mut self, over: &Running) {
         if over.command == STANDBY {
             self.idle_seq = over.seq;
@@ -329,7 +329,7 @@ impl Arbiter {
         }
     }
 
-    /// Gives the setpoint in force a new sequence byte, so that the board executes it anew.
+    /// Gives the setpoint in force a new sequence byte, so that the board executes it as new.
     fn reseat(&mut self) {
         let seq = self.next_seq();
         if let Some(running) = self.running.as_mut() {
@@ -349,7 +349,7 @@ impl Arbiter {
         }
     }
 
-    /// Compares a report with the one-shot looked for, which is not the last finished one.
+    /// Compares a report with the wanted one-shot, which is not the last finished one.
     fn look_for(&mut self, report: &SteerData) {
         let Some(running) = self.running.as_mut() else {
             return;
@@ -378,14 +378,14 @@ impl Arbiter {
         }
     }
 
-    /// Whether a command is written only once the wire is free. Whatever ends a movement does not
+    /// Whether a command waits until the wire is free. A command that ends a movement does not
     /// wait.
     fn waits_for_wire(&self, command: SteerCommand) -> bool {
         let is_standby = |command: SteerCommand| command.code == STANDBY.code();
         !is_standby(command) || self.written.is_some_and(is_standby)
     }
 
-    /// Whether the board is told a command again and again.
+    /// Whether the board gets a command again and again.
     fn repeats(&self, command: SteerCommand) -> bool {
         match self.board {
             None => false,
@@ -394,7 +394,7 @@ impl Arbiter {
         }
     }
 
-    /// Whether a standby goes out in place of the order in force, an arm order that has to wait.
+    /// Whether a standby goes out while the order in force, an arm order, must wait.
     fn is_held(&self) -> bool {
         self.running.is_some_and(|running| {
             let is_arm = matches!(running.command, Command::Arm(_));
@@ -402,7 +402,7 @@ impl Arbiter {
         })
     }
 
-    /// Whether it is known what belongs on the wire.
+    /// Whether it is known which command belongs on the wire.
     fn may_write(&self) -> bool {
         self.running.is_none_or(|running| {
             matches!(running.lease, Lease::Until(_)) && running.search.is_none()
@@ -429,8 +429,8 @@ fn original_is_done(running: &Running, now: Duration) -> bool {
     }
 }
 
-/// How long an original board, which reports nothing, is given for a one-shot: the timed turns
-/// of W4 (a full turn takes 12 s) and a generous time for the arm.
+/// How long an original board, which reports nothing, gets for a one-shot: the timed turns of W4 (a
+/// full turn takes 12 s), and plenty of time for the arm.
 fn original_duration(command: Command) -> Option<Duration> {
     let millis = match command {
         Command::Wheel(WheelCommand::LeftPerp | WheelCommand::RightPerp) => 3_250,

@@ -1,17 +1,17 @@
-//! Requests: changes of the mode, the release of a stop, and settings of the boards.
+//! Requests: to change the mode, to release a stop, and to set values of the boards.
 //!
-//! It is apart because an answer may have to wait: for a board, or for the stop word. The core's
-//! turns go on meanwhile. One request is under way at a time.
+//! They stand apart because an answer may have to wait for a board or for the stop word, and the
+//! core's turns go on meanwhile. One request is under way at a time.
 
 use core::time::Duration;
 
-use lager_topics::{Answer, Ask, AskKind, Mode, Outcome};
+use lager_orders::lease::LATEST_MOVE_NS;
+use lager_orders::{Mode, Moment};
+use lager_topics::{Ask, AskKind, BridgeAnswer, Outcome};
 use lager_wire::{Callsign, Command, SettingKey, Version, WheelCommand};
 
-use super::action::News;
+use super::effect::Notice;
 use super::{Asked, BridgeCore};
-use crate::arbiter::STALE;
-use crate::events::Moment;
 use crate::settings::{self, Progress};
 
 impl BridgeCore {
@@ -19,32 +19,32 @@ impl BridgeCore {
     pub fn ask(&mut self, now: Moment, ask: &Ask) {
         use Asked::Answered;
         self.wake(now.robot);
-        // What lets the robot move comes at once or not at all.
+        // A request that lets the robot move comes in time or has no effect.
         let lets_move = match ask.kind.get() {
             Some(AskKind::Resume | AskKind::Begin) => true,
             Some(AskKind::SetMode) => ask.mode.get() == Some(Mode::Autonomous),
             _ => false,
         };
-        let is_stale = now.ns.abs_diff(ask.issued_ns) > STALE.as_nanos() as u64;
+        let is_stale = now.ns.abs_diff(ask.issued_ns) > LATEST_MOVE_NS;
         self.asked = Some(match (ask.kind.get(), ask.mode.get()) {
-            // The asker or this process was held up, and no process waits for the effect any more.
+            // The sender or this process was held up, and nobody waits for the effect any more.
             (kind, _) if ask.is_over(now.ns) || (lets_move && is_stale) => {
-                self.say(News::Late(kind));
+                self.say(Notice::Late(kind));
                 Answered(Outcome::Late)
             }
             (Some(AskKind::SetMode), Some(mode)) => {
-                self.say(News::ModeSet(mode));
+                self.say(Notice::ModeSet(mode));
                 self.arbiter.set_mode(mode);
                 Answered(Outcome::Done)
             }
             (Some(AskKind::Begin), _) => {
                 if !self.arbiter.is_mode_chosen() {
-                    self.say(News::ModeSet(Mode::Autonomous));
+                    self.say(Notice::ModeSet(Mode::Autonomous));
                     self.arbiter.set_mode(Mode::Autonomous);
                 }
                 Answered(Outcome::Done)
             }
-            // It releases the stop that its asker has named, and no other.
+            // It releases only the stop that the request names.
             (Some(AskKind::Resume), _) => match self.stop {
                 Some(stop) if stop.word() == ask.stop_word => {
                     self.due.release = Some(stop);
@@ -57,14 +57,10 @@ impl BridgeCore {
                 let gains = [ask.gain_p.into(), ask.gain_d.into()];
                 self.set(now.robot, &[SettingKey::GainP, SettingKey::GainD], &gains)
             }
-            // Its thresholds would be those of what it happens to drive over.
+            // The thresholds would come from whatever the robot drives over.
             (Some(AskKind::Calibrate), _) if self.is_under_way() => Answered(Outcome::UnderWay),
-            // Done means that it has begun; `link/health` tells its end.
+            // "Done" means that it has begun; `link/health` reports its end.
             (Some(AskKind::Calibrate), _) => self.set(now.robot, &[SettingKey::Calibrate], &[1]),
-            (Some(AskKind::ResetBoards), _) => {
-                self.say(News::NoReset);
-                Answered(Outcome::Refused)
-            }
             (Some(AskKind::SetMode), None) | (None, _) => Answered(Outcome::Refused),
         });
     }
@@ -77,8 +73,8 @@ impl BridgeCore {
         drives && self.arbiter.mode() == Mode::Autonomous && !self.arbiter.is_stopped()
     }
 
-    /// The answer, once it can be given and its content is in force.
-    pub fn answer(&mut self) -> Option<Answer> {
+    /// The answer, once it is known and its content is in force.
+    pub fn answer(&mut self) -> Option<BridgeAnswer> {
         let Some(Asked::Answered(outcome)) = self.asked else {
             return None;
         };
@@ -87,18 +83,18 @@ impl BridgeCore {
             let value = self.settings.in_force(key).unwrap_or(0);
             u8::try_from(value).unwrap_or(0)
         };
-        Some(Answer {
+        Some(BridgeAnswer {
             outcome: outcome.into(),
             mode: self.arbiter.mode().into(),
             stopped: self.arbiter.is_stopped().into(),
             gain_p: gain(SettingKey::GainP),
             gain_d: gain(SettingKey::GainD),
-            ..Answer::default()
+            ..BridgeAnswer::default()
         })
     }
 
-    /// What became of [`Action::Release`](super::Action::Release): the word is clear, or a newer
-    /// stop holds, which is handed in besides.
+    /// The result of [`Effect::Release`](super::Effect::Release): the word is clear, or it has a
+    /// newer stop, which is handed in separately.
     pub fn released(&mut self, is_clear: bool) {
         if is_clear {
             self.stop = None;
@@ -110,7 +106,7 @@ impl BridgeCore {
         }));
     }
 
-    /// Sends settings to the board they belong to.
+    /// Sends settings to their board.
     fn set(&mut self, now: Duration, keys: &'static [SettingKey], values: &[i16]) -> Asked {
         let is_calibration = keys == [SettingKey::Calibrate];
         let board = match is_calibration {
@@ -130,7 +126,7 @@ impl BridgeCore {
         Asked::Setting { keys, until }
     }
 
-    /// Sees whether a board has answered what a request is waiting for.
+    /// Checks whether a board has sent the answer for which a request waits.
     pub(super) fn hear_answer(&mut self, now: Duration) {
         let Some(Asked::Setting { keys, until }) = self.asked else {
             return;

@@ -1,86 +1,87 @@
-//! All that the bridge decides, as a pure state machine: events in, actions out, time an argument.
+//! Every decision of the bridge, as a pure state machine: events in, effects out, time an argument.
 //!
-//! It is apart from the service so that `lager simulate` runs the very same bridge: boards that
-//! come and go, the arm's profile and the settings on their way to them, requests, the stop, and
-//! what is published when. The process that runs it owns the ports, the bus, the stop word and the
+//! It stands apart from the service so that `lager simulate` runs the same bridge: boards that come
+//! and go, the arm's profile and the settings on their way to the boards, requests, the stop, and
+//! when to publish what. The process that runs it owns the ports, the bus, the stop word and the
 //! clock, and decides nothing. Nothing here allocates.
 //!
 //! ```text
 //!   port, order, press, ask, stop ──> what is due at once ─┐
-//!                                                          ├──> next: one action after the other
+//!                                                          ├──> next: one effect after the other
 //!   decide, once a turn ────> health, commands, settings ──┘
 //! ```
 //!
-//! One turn: hand in all that has come, and carry out what [`BridgeCore::next`] returns after each
-//! event; then call [`BridgeCore::decide`] and carry out the rest. Look at the stop word before
-//! each action and hand a stop in. Then nothing that was decided before a stop is written after it.
+//! One turn: hand in everything that has come, and after each event carry out what
+//! [`BridgeCore::next`] returns. Then call [`BridgeCore::decide`] and carry out the rest. Look at
+//! the stop word before each effect and hand a stop in. Then nothing that was decided before a stop
+//! is written after it.
 //!
-//! The order of the actions matters. `link/health` goes out before the bytes are written, so that
-//! no successor takes an order that was carried out for a new one. Only what may be said twice is
-//! written first: a setpoint that replaces a setpoint, and the standby of a stop. For a setpoint a
-//! successor leaves out one sequence number, which may have been used. Turns and steps of the arm
-//! run once, so they go out after the state.
+//! The order of the effects matters. `link/health` goes out before the bytes are written, so that
+//! no successor takes an order that was carried out for a new one. Only commands that may be sent
+//! twice are written first: a setpoint that replaces a setpoint, and the standby of a stop. After
+//! such a setpoint a successor leaves out one sequence byte, which may have been used. Turns and
+//! steps of the arm run once, so they go out after the state.
 //!
 //! * `asks`: requests.
-//! * `ports`: what happens at the ports.
-//! * `telling`: what is published.
+//! * `ports`: the events of the ports.
+//! * `publishing`: the states that it publishes.
 //! * `rest`: when a stop has come to its end.
 
-mod action;
 mod asks;
+mod effect;
 mod ports;
+mod publishing;
 mod rest;
-mod telling;
 #[cfg(test)]
 mod tests;
 
 use core::time::Duration;
 
 use heapless::Deque;
-use lager_ports::Stop;
-use lager_topics::{Health, Mode, Outcome, Refusal, SteeringOrder, SteeringReport, StopCause};
+use lager_orders::lease::SETPOINT;
+use lager_orders::{Mode, Moment};
+use lager_stop::Stop;
+use lager_topics::{Health, Outcome, Refusal, SteeringOrder, SteeringReport, StopCause};
 use lager_wire::link::HostTransmitter;
 use lager_wire::{
     ArmProfile, Callsign, Command, PACKET_LENGTH, Payload, Setting, SettingKey, SteerData, Version,
 };
 
-pub use action::{Action, News, ShownReport, Write};
+pub use effect::{Effect, Notice, ShownReport, Write};
 
-use crate::arbiter::{Arbiter, Ended, LEASE, OrderKey, Verdict};
+use crate::arbiter::{Arbiter, Ended, OrderKey, Verdict};
 use crate::boards::Boards;
 use crate::calibration::Calibration;
-use crate::events::Moment;
 use crate::frames::ServoTable;
-use crate::presses::Presses;
 use crate::profile::ProfileTeller;
 use crate::resets::Resets;
 use crate::settings::Settings;
 use rest::Rest;
 
-/// When `link/health` is published at the latest if nothing changes, in robot time.
+/// How long `link/health` may wait if nothing changes, in robot time.
 const HEALTH_PERIOD: Duration = Duration::from_millis(100);
 
-/// How often the steering board reports at 500 000 Bd, in robot time. What falls due before the
-/// next report is done with this one: no timer has to wake the bridge for it, least of all in the
-/// middle of a frame's way.
+/// How often the steering board reports at 500 000 Bd, in robot time. Work that is due before the
+/// next report is done with this one. So no timer has to wake the bridge for it, least of all in
+/// the middle of a frame's way.
 const REPORT_PERIOD: Duration = Duration::from_millis(5);
 
 /// How often a shutdown writes standby at least, if there is a board.
 const PARKING_WRITES: u32 = 3;
 
-/// More news than one event can bring.
+/// One event brings less news than this.
 const NEWS: usize = 8;
 
-/// What the core is told at start.
+/// The core's configuration.
 #[derive(Clone, Copy, Debug)]
 pub struct CoreOptions {
     /// The ports' speed in baud, for `link/health`.
     pub baud: u32,
-    /// Ask the sensor board for its raw readings besides the line's state.
+    /// Whether to ask the sensor board for its raw readings as well.
     pub raw_line: bool,
-    /// Drive an original steering board, whose commands have no age limit.
+    /// Whether to drive an original steering board, whose commands have no age limit.
     pub original_boards: bool,
-    /// What the arm may do, as the steering board is told. Its owner has validated it.
+    /// The arm's limits for the steering board. Their owner has validated them.
     pub arm: ArmProfile,
 }
 
@@ -96,7 +97,6 @@ pub struct BridgeCore {
     calibration: Calibration,
     servos: ServoTable,
     resets: Resets,
-    presses: Presses,
     /// The last report of a version-1 steering board in this life of its link, and when it was
     /// read.
     report: Option<(SteerData, Moment)>,
@@ -107,30 +107,30 @@ pub struct BridgeCore {
     parking: Option<Parking>,
     due: Due,
     stage: Stage,
-    /// `link/health` has something to tell in this turn, and goes out after the command.
+    /// `link/health` has news in this turn, and goes out after the command.
     tells: bool,
     writes_first: bool,
-    told: Told,
+    told: Published,
     health_due: Duration,
-    /// When something was handed in last, or asked for.
+    /// The time of the last call.
     awake: Option<Duration>,
 }
 
 /// A request under way.
 #[derive(Clone, Copy, Debug)]
 enum Asked {
-    /// It can be answered.
+    /// The answer is known.
     Answered(Outcome),
-    /// The stop is being released.
+    /// The core is releasing the stop.
     Releasing,
-    /// A board has been told these settings, and has until then to answer.
+    /// A board has these settings, and must answer until then.
     Setting {
         keys: &'static [SettingKey],
         until: Duration,
     },
 }
 
-/// How far a shutdown has come.
+/// The progress of a shutdown.
 #[derive(Clone, Copy, Debug, Default)]
 struct Parking {
     standbys: u32,
@@ -138,30 +138,30 @@ struct Parking {
     at_rest: bool,
 }
 
-/// What is to be done at once.
+/// What to do at once.
 #[derive(Debug, Default)]
 struct Due {
     discard: [bool; 2],
-    /// A stop has come: its standby, before everything else.
+    /// A stop has come: write its standby before everything else.
     halt: bool,
     handshake: [Option<Handshake>; 2],
     release: Option<Stop>,
     stop: Option<StopCause>,
     shown: Option<ShownReport>,
-    /// `steering/state`, because of the report read then, in ns.
+    /// Publish `steering/state`, because of the report that was read then, in ns.
     state: Option<u64>,
     health: bool,
-    news: Deque<News, NEWS>,
+    news: Deque<Notice, NEWS>,
 }
 
-/// What a port's board is waiting for.
+/// What the board at a port waits for.
 #[derive(Clone, Copy, Debug)]
 enum Handshake {
     Syn,
     Ack(Version),
 }
 
-/// How far the turn has come.
+/// The progress of the turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Over,
@@ -174,8 +174,8 @@ enum Stage {
 
 /// What was published last.
 #[derive(Clone, Copy, Debug)]
-struct Told {
-    /// The arbiter's revisions that `link/health` and `steering/state` showed.
+struct Published {
+    /// The arbiter's revisions in `link/health` and `steering/state`.
     health: u32,
     state: u32,
     /// The order that ended last.
@@ -186,7 +186,7 @@ struct Told {
     setpoint: bool,
     /// `steering/state` has shown the last report.
     report: bool,
-    /// All that it has shown.
+    /// Its last sample.
     shown: SteeringReport,
 }
 
@@ -197,11 +197,11 @@ fn packet_time(baud: u32) -> Duration {
 }
 
 impl BridgeCore {
-    /// A bridge that goes on where an earlier one ended, if that bridge's state was kept: what it
-    /// published last, and when (robot time).
+    /// A bridge that goes on where an earlier one ended, if that bridge's state was kept: its last
+    /// state, and when it was published (robot time).
     ///
-    /// A stop that was latched then is not taken over: the stop word decides, and the caller sets
-    /// it again if it is clear.
+    /// It does not take over a stop: the stop word decides, and the caller sets the stop again if
+    /// the word is clear.
     pub fn new(options: CoreOptions, kept: Option<(&Health, Duration)>) -> Self {
         let mut arbiter = kept.map_or_else(Arbiter::new, |(kept, published)| {
             Arbiter::resume(kept, published)
@@ -226,7 +226,6 @@ impl BridgeCore {
             calibration: Calibration::new(kept),
             servos: ServoTable::default(),
             resets: Resets::default(),
-            presses: kept.map_or_else(Presses::default, Presses::resume),
             report: None,
             stop: None,
             rest: Rest::default(),
@@ -239,7 +238,7 @@ impl BridgeCore {
             stage: Stage::Over,
             tells: false,
             writes_first: false,
-            told: Told {
+            told: Published {
                 health: arbiter.revision(),
                 state: arbiter.revision(),
                 end: arbiter.last_ended(),
@@ -254,17 +253,17 @@ impl BridgeCore {
         }
     }
 
-    /// Notices a pause of this process: whatever comes after it, and whatever was decided before it
-    /// and not done yet, moves nothing by an order of before.
+    /// Notices a pause of this process. After a pause no order from before it moves anything,
+    /// whether its command was already decided or comes now.
     fn wake(&mut self, now: Duration) {
         let before = self.awake.replace(now).unwrap_or(now);
-        if now.saturating_sub(before) >= LEASE {
+        if now.saturating_sub(before) >= SETPOINT {
             self.arbiter.wake(now);
         }
     }
 
-    /// Takes an order that its origin sent at `sent`, in robot time at most `now`, and that is as
-    /// old as `age` says ([`Arbiter::order`]); the order that it has put in force.
+    /// Takes an order that its origin sent at `sent` (robot time, at most `now`); `age` is its age
+    /// ([`Arbiter::order`]). Returns the order that it has put in force.
     pub fn order(
         &mut self,
         now: Duration,
@@ -278,23 +277,10 @@ impl BridgeCore {
         (verdict == Verdict::Executes).then_some(key)
     }
 
-    /// The switch was pressed at `pressed_ns` of `CLOCK_MONOTONIC`, which changes the mode.
-    pub fn press(&mut self, now: Moment, id: u32, pressed_ns: u64) {
-        self.wake(now.robot);
-        if self.presses.take(id, pressed_ns, now.ns) {
-            let mode = match self.arbiter.mode() {
-                Mode::Manual => Mode::Autonomous,
-                Mode::Autonomous => Mode::Manual,
-            };
-            self.say(News::Pressed(mode));
-            self.arbiter.set_mode(mode);
-        }
-    }
-
-    /// The switch was moved to `mode`.
+    /// Somebody moved the switch to `mode`.
     pub fn switch(&mut self, mode: Mode) {
         if self.arbiter.mode() != mode {
-            self.say(News::Pressed(mode));
+            self.say(Notice::Pressed(mode));
         }
         self.arbiter.set_mode(mode);
     }
@@ -305,11 +291,11 @@ impl BridgeCore {
         self.stop = Some(stop);
         self.rest = Rest::default();
         self.arbiter.stop();
-        // A board of ours finds the standby behind a packet that was cut in two, by its structure.
-        // A packet that lacks only its check value may find it in the standby's first byte, once in
-        // 256 times; the packet is then carried out until the next standby, at most 40 ms later. An
-        // original board would take the standby's first bytes for the rest of that packet and carry
-        // it out, so there the packet is finished.
+        // If a packet was cut in two, a board of ours finds the standby after it by its structure.
+        // If the packet lacks only its check value, the standby's first byte may match it, once in
+        // 256 times; then the board obeys the packet until the next standby, at most 40 ms later.
+        // An original board would take the standby's first bytes for the rest of the packet and
+        // obey it, so there the packet is finished first.
         if self.boards.version(Callsign::Steering) == Some(Version::One)
             && let Some(place) = self.boards.place(Callsign::Steering)
         {
@@ -325,7 +311,7 @@ impl BridgeCore {
         self.parking = Some(Parking::default());
     }
 
-    /// Whether a shutdown has brought the robot to rest, as far as that can be known.
+    /// Whether a shutdown has brought the robot to rest, as far as anybody can know.
     pub fn is_parked(&self) -> bool {
         let at_rest = self
             .parking
@@ -333,7 +319,7 @@ impl BridgeCore {
         at_rest || self.boards.place(Callsign::Steering).is_none()
     }
 
-    /// All that has come in this turn was handed in: lets time pass and settles what is due.
+    /// Everything of this turn was handed in: lets time pass and does what is due.
     pub fn decide(&mut self, now: Duration) {
         self.wake(now);
         self.arbiter.advance(now);
@@ -345,20 +331,20 @@ impl BridgeCore {
         self.stage = Stage::Health;
     }
 
-    /// What to do now; ask until there is nothing, each time with the present moment: this process
-    /// may have been held up since it asked last.
-    pub fn next(&mut self, now: Moment) -> Option<Action> {
+    /// What to do now. Ask until it returns nothing, each time with the present moment: this
+    /// process may have been held up since the last call.
+    pub fn next(&mut self, now: Moment) -> Option<Effect> {
         self.wake(now.robot);
         loop {
-            // The actions of one stage are carried out before the next stage.
-            if let Some(action) = self.at_once(now) {
-                return Some(action);
+            // All effects of one stage come before the next stage.
+            if let Some(effect) = self.at_once(now) {
+                return Some(effect);
             }
             if self.stage == Stage::Over {
                 return None;
             }
-            if let Some(action) = self.in_turn(now) {
-                return Some(action);
+            if let Some(effect) = self.in_turn(now) {
+                return Some(effect);
             }
         }
     }
@@ -380,7 +366,7 @@ impl BridgeCore {
         }
     }
 
-    /// When [`BridgeCore::decide`] has something to do, if nothing comes before; a moment that is
+    /// When [`BridgeCore::decide`] has something to do, if nothing comes before. A moment in the
     /// past means now.
     pub fn next_due(&self) -> Duration {
         let settings = [Callsign::Sensor, Callsign::Steering]
@@ -393,7 +379,7 @@ impl BridgeCore {
             .fold(self.health_due, Duration::min)
     }
 
-    /// The rules by which a board speaks, while it is up.
+    /// The version of the protocol that a board speaks, while it is up.
     pub fn version(&self, board: Callsign) -> Option<Version> {
         self.boards.version(board)
     }
@@ -403,20 +389,20 @@ impl BridgeCore {
         self.arbiter.mode()
     }
 
-    /// What was waiting when something happened, most urgent first.
-    fn at_once(&mut self, now: Moment) -> Option<Action> {
+    /// The effects that wait, the most urgent first.
+    fn at_once(&mut self, now: Moment) -> Option<Effect> {
         if let Some(place) = self.due.discard.iter().position(|discard| *discard) {
             self.due.discard[place] = false;
-            return Some(Action::Discard { place });
+            return Some(Effect::Discard { place });
         }
         if self.due.halt {
             if let Some(write) = self.command(now) {
-                return Some(Action::Write(write));
+                return Some(Effect::Write(write));
             }
             self.due.halt = false;
         }
         if let Some(cause) = self.due.stop.take() {
-            return Some(Action::Stop(cause));
+            return Some(Effect::Stop(cause));
         }
         for place in 0..self.due.handshake.len() {
             if let Some(handshake) = self.due.handshake[place].take() {
@@ -425,7 +411,7 @@ impl BridgeCore {
                     Handshake::Syn => transmitter.syn(),
                     Handshake::Ack(version) => transmitter.ack(version),
                 };
-                return Some(Action::Write(Write {
+                return Some(Effect::Write(Write {
                     place,
                     packet,
                     command: None,
@@ -434,23 +420,23 @@ impl BridgeCore {
             }
         }
         if let Some(stop) = self.due.release.take() {
-            return Some(Action::Release(stop));
+            return Some(Effect::Release(stop));
         }
         if let Some(shown) = self.due.shown.take() {
-            return Some(Action::ShowReport(shown));
+            return Some(Effect::ShowReport(shown));
         }
         if let Some(report_ns) = self.due.state.take() {
             let report_ns = Some(report_ns);
-            return Some(Action::PublishState { report_ns });
+            return Some(Effect::PublishState { report_ns });
         }
         if core::mem::take(&mut self.due.health) {
             return Some(self.publish_health(now));
         }
-        self.due.news.pop_front().map(Action::Say)
+        self.due.news.pop_front().map(Effect::Say)
     }
 
-    /// The next thing of the turn, stage by stage; `None` goes on to the next stage.
-    fn in_turn(&mut self, now: Moment) -> Option<Action> {
+    /// The next effect of the turn, stage by stage; `None` goes on to the next stage.
+    fn in_turn(&mut self, now: Moment) -> Option<Effect> {
         match self.stage {
             Stage::Over => {}
             Stage::Health => {
@@ -460,7 +446,7 @@ impl BridgeCore {
                 }
             }
             Stage::Commands => match self.command(now) {
-                Some(write) => return Some(Action::Write(write)),
+                Some(write) => return Some(Effect::Write(write)),
                 None => self.stage = Stage::HealthAfter,
             },
             Stage::HealthAfter => {
@@ -470,23 +456,23 @@ impl BridgeCore {
                 }
             }
             Stage::Settings => match self.setting(now) {
-                Some(write) => return Some(Action::Write(write)),
+                Some(write) => return Some(Effect::Write(write)),
                 None => self.stage = Stage::State,
             },
             Stage::State => {
                 self.stage = Stage::Over;
-                // A report tells the order in force soon enough, but not every board reports.
+                // A report shows the order in force soon enough, but not every board reports.
                 let is_told = self.arbiter.revision() == self.told.state;
                 let unreported = self.report.is_none() && !is_told;
                 if unreported || self.arbiter.last_ended() != self.told.end {
-                    return Some(Action::PublishState { report_ns: None });
+                    return Some(Effect::PublishState { report_ns: None });
                 }
             }
         }
         None
     }
 
-    /// The packet with what the arbiter wants written.
+    /// The packet with the command that the arbiter wants on the wire.
     fn command(&mut self, now: Moment) -> Option<Write> {
         let place = self.boards.place(Callsign::Steering)?;
         let command = self.arbiter.poll(now.robot)?;
@@ -511,7 +497,7 @@ impl BridgeCore {
                 continue;
             };
             while let Some(setting) = self.due_setting(now.robot, board) {
-                // What a board does not understand is not sent, and so not answered.
+                // The board would not understand this setting, and not answer.
                 if let Some(packet) = self.transmitters[place].encode(Payload::Setting(setting)) {
                     return Some(Write {
                         place,
@@ -538,14 +524,14 @@ impl BridgeCore {
         setting
     }
 
-    /// What logic has to know at once.
+    /// The part of the state that logic must know at once.
     fn who_may_move(&self) -> (Mode, bool, Refusal) {
         let arbiter = &self.arbiter;
         (arbiter.mode(), arbiter.is_stopped(), arbiter.blocked())
     }
 
-    /// Tells people; news that does not fit is dropped.
-    fn say(&mut self, news: News) {
+    /// Keeps news for people; news beyond the limit is dropped.
+    fn say(&mut self, news: Notice) {
         let _ = self.due.news.push_back(news);
     }
 }

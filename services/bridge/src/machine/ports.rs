@@ -1,16 +1,17 @@
-//! What happens at the ports: boards that come, report, answer and go.
+//! The events of the ports: boards that come, report, answer and go.
 //!
-//! It is apart from the turn because each of these has its effect at once, whatever else the turn
+//! They stand apart from the turn because each event has its effect at once, whatever else the turn
 //! brings.
 
+use lager_orders::Moment;
 use lager_topics::{ArmProfileState, StopCause};
 use lager_wire::link::HostTransmitter;
 use lager_wire::{Callsign, SettingKey, SettingReply, SteerData, Version};
 
-use super::action::{News, ShownReport};
+use super::effect::{Notice, ShownReport};
 use super::{BridgeCore, Handshake, REPORT_PERIOD};
 use crate::arbiter::ArmGate;
-use crate::events::{BoardUp, Moment, PortEvent};
+use crate::events::{BoardUp, PortEvent};
 use crate::frames::ServoTable;
 
 impl BridgeCore {
@@ -38,7 +39,7 @@ impl BridgeCore {
             PortEvent::Silent => {
                 self.due.discard[place] = true;
                 // `link/health` tells it to everybody.
-                self.say(News::Silent { place });
+                self.say(Notice::Silent { place });
                 self.board_down(place);
                 self.due.health = true;
             }
@@ -50,7 +51,8 @@ impl BridgeCore {
         }
     }
 
-    /// Keeps the arm where it is unless the board obeys the profile, and tells what it says.
+    /// Keeps the arm still unless the board has accepted the profile, and reports what the board
+    /// says.
     pub(super) fn heed_profile(&mut self, before: ArmProfileState) {
         let state = self.profile.state();
         self.arbiter.set_arm_gate(match state {
@@ -63,7 +65,7 @@ impl BridgeCore {
             _ if state == before => {}
             ArmProfileState::NoBoard | ArmProfileState::Telling => {}
             _ => {
-                self.say(News::Profile(state));
+                self.say(Notice::Profile(state));
                 self.due.health = true;
             }
         }
@@ -71,7 +73,7 @@ impl BridgeCore {
 
     fn board_up(&mut self, now: Moment, place: usize, board: &BoardUp) {
         let up = board.up;
-        // A steering board that was on this port is not there any more.
+        // If a steering board was on this port, it has gone.
         if up.callsign != Callsign::Steering {
             self.board_down(place);
         }
@@ -88,15 +90,15 @@ impl BridgeCore {
             self.heed_profile(before);
             self.arbiter.board_up(now.robot, up.version, up.rebooted);
             if up.version == Version::Original && !self.options.original_boards {
-                self.say(News::OriginalBoard { place });
+                self.say(Notice::OriginalBoard { place });
             }
         }
         if up.rebooted && self.resets.note(now.robot, up.callsign) {
-            self.say(News::KeepsResetting(up.callsign));
+            self.say(Notice::KeepsResetting(up.callsign));
             self.due.stop = Some(StopCause::BoardResets);
         }
         let board = *board;
-        self.say(News::Up { place, board });
+        self.say(Notice::Up { place, board });
         self.due.health = true;
     }
 
@@ -144,7 +146,7 @@ impl BridgeCore {
         if self.profile.answer(now.robot, reply) {
             self.heed_profile(before);
         } else if self.settings.answer(reply) {
-            // Before the request is answered: a gain in force outlives this bridge.
+            // Publish before the answer: a gain in force outlives this bridge.
             self.due.health = true;
         } else if reply.key == SettingKey::Calibrate {
             self.calibration.hear(reply);

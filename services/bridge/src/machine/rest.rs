@@ -1,34 +1,34 @@
-//! When a stop has come to its end: the steering board says that the wheels are at rest.
+//! Finds out when a stop has reached the wheels: when the steering board reports them at rest.
 //!
-//! Apart from the core because it is a proof of its own, from three things: when the stop's
-//! standby was written, when a report was read, and what it says.
+//! It stands apart from the core because it is a proof of its own, from three things: when the
+//! stop's standby was written, when a report was read, and what the report says.
 
 use lager_wire::SteerData;
 
 /// How many reports in a row with wheels at rest prove that they are at rest.
 const REPORTS: u8 = 2;
 
-/// The time after the standby was written, in ns, within which a report that is read may have been
-/// sent before the standby reached the board.
+/// A report that is read within this time after the standby was written may have left the board
+/// before the standby reached it, in ns.
 const ON_ITS_WAY_NS: u64 = 5_000_000;
 
-/// How far the board has come in obeying the stop in force.
+/// How far the board has obeyed the stop in force.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rest {
     /// When the stop in force was first written to the board, in ns.
     written_ns: Option<u64>,
-    /// Reports since then, one after the other, that show the wheels at rest.
+    /// How many reports in a row have shown the wheels at rest since then.
     reports: u8,
 }
 
 impl Rest {
-    /// The stop in force has been written to the steering board.
+    /// The standby of the stop in force has been written to the steering board.
     pub(super) fn written(&mut self, at_ns: u64) {
         self.written_ns.get_or_insert(at_ns);
     }
 
-    /// The steering board has reported, as was read at `at_ns`; whether that is the report that
-    /// proves the wheels at rest.
+    /// A report of the steering board was read at `at_ns`. Returns whether it proves the wheels at
+    /// rest.
     pub(super) fn report(&mut self, data: &SteerData, at_ns: u64) -> bool {
         let on_its_way_until = self.written_ns.map(|written| written + ON_ITS_WAY_NS);
         if on_its_way_until.is_none_or(|until| at_ns < until) {

@@ -1,9 +1,9 @@
-//! The order of the core's actions, in virtual time.
+//! The order of the core's effects, in virtual time.
 
-use lager_ports::Stop;
+use lager_orders::Mode;
+use lager_stop::Stop;
 use lager_topics::{
-    ArmProfileState, Ask, AskKind, Mode, Origin, Outcome, Role, SteeringOrder, SteeringReport,
-    StopCause,
+    ArmProfileState, Ask, AskKind, Origin, Outcome, Role, SteeringOrder, SteeringReport, StopCause,
 };
 use lager_wire::link::Up;
 use lager_wire::{
@@ -67,22 +67,22 @@ fn report(core: &mut BridgeCore, millis: u64, data: SteerData) {
     core.port(at, STEERING, PortEvent::Steer { data, at });
 }
 
-/// The next action, carried out: a word for it, and the command if it is one.
+/// The next effect, carried out: a word for it, and the command if it is one.
 fn step(core: &mut BridgeCore, millis: u64) -> Option<(&'static str, Option<u8>)> {
-    let action = core.next(at(millis))?;
-    Some(match action {
-        Action::Write(write) => {
+    let effect = core.next(at(millis))?;
+    Some(match effect {
+        Effect::Write(write) => {
             core.wrote(&write, true, at(millis));
             match write.command {
                 Some(command) => ("command", Some(command.code)),
                 None => ("packet", None),
             }
         }
-        Action::PublishHealth { .. } => {
+        Effect::PublishHealth { .. } => {
             core.health_told();
             ("health", None)
         }
-        Action::PublishState { .. } => {
+        Effect::PublishState { .. } => {
             let mut shown = SteeringReport::default();
             core.fill_state(at(millis).robot, &mut shown);
             let what = match core.is_news(&shown) {
@@ -92,13 +92,13 @@ fn step(core: &mut BridgeCore, millis: u64) -> Option<(&'static str, Option<u8>)
             core.state_told(&shown);
             (what, None)
         }
-        Action::Discard { .. } => ("discard", None),
-        Action::ShowReport(shown) if shown.proves_rest => ("at rest", None),
-        Action::ShowReport(_) => ("report", None),
-        Action::Stop(_) => ("stop", None),
-        Action::Release(_) => ("release", None),
-        Action::Say(News::Profile(ArmProfileState::Unanswered)) => ("no answer", None),
-        Action::Say(_) => ("news", None),
+        Effect::Discard { .. } => ("discard", None),
+        Effect::ShowReport(shown) if shown.proves_rest => ("at rest", None),
+        Effect::ShowReport(_) => ("report", None),
+        Effect::Stop(_) => ("stop", None),
+        Effect::Release(_) => ("release", None),
+        Effect::Say(Notice::Profile(ArmProfileState::Unanswered)) => ("no answer", None),
+        Effect::Say(_) => ("news", None),
     })
 }
 
@@ -251,7 +251,7 @@ fn what_was_decided_before_a_pause_is_not_written_after_it() {
     let mut core = core();
     order(&mut core, 1_002, 1, FORWARD);
     core.decide(at(1_002).robot);
-    // The process is frozen between its decision and the first action.
+    // The process is frozen between its decision and the first effect.
     let done: Vec<_> = std::iter::from_fn(|| step(&mut core, 1_502)).collect();
     let commands: Vec<_> = done.iter().filter(|(what, _)| *what == "command").collect();
     assert!(
@@ -394,4 +394,51 @@ fn a_report_rings_if_the_robot_moves_or_does_something_else() {
     }
     assert!(rings(1_041, IDLE), "it has come to rest");
     assert!(!rings(1_046, IDLE));
+}
+
+#[test]
+fn a_report_grows_old_where_none_follows() {
+    let mut core = core();
+    let mut age = |millis: u64| {
+        turn(&mut core, millis);
+        let mut shown = SteeringReport::default();
+        core.fill_state(at(millis).robot, &mut shown);
+        (shown.left_duty, shown.age_ms)
+    };
+    assert_eq!(age(1_002), (0, 1));
+    assert_eq!(age(1_301), (0, 300));
+}
+
+#[test]
+fn boards_are_not_reset_nor_calibrated_while_they_drive_and_what_is_unknown_is_refused() {
+    let mut core = core();
+    let mut outcome = |millis: u64, kind| {
+        let ask = Ask {
+            issued_ns: at(millis).ns,
+            lifetime_ms: 500,
+            kind,
+            mode: Mode::Autonomous.into(),
+            ..Ask::default()
+        };
+        core.ask(at(millis), &ask);
+        turn(&mut core, millis);
+        let order = SteeringOrder {
+            id: 1,
+            origin: Origin::Logic.into(),
+            code: Command::Wheel(FOLLOW).code(),
+            ..SteeringOrder::default()
+        };
+        core.order(at(millis).robot, at(millis).robot, Duration::ZERO, &order);
+        core.answer().map(|answer| answer.outcome)
+    };
+    assert_eq!(
+        outcome(1_002, AskKind::SetMode.into()),
+        Some(Outcome::Done.into())
+    );
+    assert_eq!(
+        outcome(1_003, AskKind::Calibrate.into()),
+        Some(Outcome::UnderWay.into())
+    );
+    let unknown = lager_sample::Tag::from_raw(77);
+    assert_eq!(outcome(1_004, unknown), Some(Outcome::Refused.into()));
 }

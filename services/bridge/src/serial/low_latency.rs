@@ -1,9 +1,9 @@
-//! The low-latency flag of a serial driver: some USB adapters collect received bytes for 16 ms
-//! unless it is set.
+//! The low-latency flag of a serial driver: without it some USB adapters collect received bytes for
+//! 16 ms.
 //!
-//! It is apart because it is the one place of the bridge that needs `unsafe`: the two requests
-//! `TIOCGSERIAL` and `TIOCSSERIAL` have no safe wrapper. Drivers without the flag, pseudo
-//! terminals among them, are left as they are.
+//! This file stands apart because only here the bridge needs `unsafe`: the two requests
+//! `TIOCGSERIAL` and `TIOCSSERIAL` have no safe wrapper. Drivers without the flag, such as pseudo
+//! terminals, stay as they are.
 #![allow(unsafe_code)]
 
 use std::ffi::{c_char, c_int, c_uchar, c_uint, c_ulong, c_ushort};
@@ -39,7 +39,7 @@ struct SerialStruct {
     iomap_base: c_ulong,
 }
 
-/// Asks the driver for low latency; whether it is in force.
+/// Asks the driver for low latency. Returns whether it is in force.
 pub(super) fn request(fd: &OwnedFd) -> bool {
     // SAFETY: TIOCGSERIAL writes one `serial_struct` to its argument, and `SerialStruct` has that
     // layout and accepts any bit pattern.

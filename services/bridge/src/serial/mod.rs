@@ -1,11 +1,11 @@
 //! One serial port as the boards need it: raw, 8 data bits, no parity, 1 stop bit, exclusive.
 //!
-//! It is apart so that every error of the operating system about a port becomes a sentence in one
-//! place. It blocks only in [`SerialPort::read`], allocates nothing after opening, and knows
+//! It stands apart so that one place turns every error of the operating system about a port into a
+//! sentence. It blocks only in [`SerialPort::read`], allocates nothing after opening, and knows
 //! nothing of packets.
 //!
-//! A pseudo terminal is as good as a real port: modem lines are ignored, and the driver's
-//! low-latency mode is asked for but not needed.
+//! A pseudo terminal works like a real port: modem lines are ignored, and the driver's low-latency
+//! mode helps but is not necessary.
 
 mod low_latency;
 
@@ -54,7 +54,7 @@ pub enum OpenPortError {
         /// The port asked for.
         path: PathBuf,
     },
-    /// It is something else than a terminal device.
+    /// It is not a terminal device.
     #[error(
         "{} is not a serial port: name a device such as /dev/ttyUSB0 (`ls /dev/serial/by-id` lists those there are)",
         path.display()
@@ -63,7 +63,7 @@ pub enum OpenPortError {
         /// The path asked for.
         path: PathBuf,
     },
-    /// The driver does not do this speed.
+    /// The driver cannot do this speed.
     #[error(
         "the serial port {} does not do {baud} Bd: set the boards and the bridge to a speed its adapter knows",
         path.display()
@@ -74,7 +74,7 @@ pub enum OpenPortError {
         /// The speed asked for, in baud.
         baud: u32,
     },
-    /// Anything else the operating system says.
+    /// Another error of the operating system.
     #[error("the serial port {} cannot be opened: {errno}", path.display())]
     System {
         /// The port asked for.
@@ -84,7 +84,7 @@ pub enum OpenPortError {
     },
 }
 
-/// Why an open port is of no use any more: its device has gone.
+/// Why an open port does not work any more: its device has gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the device has gone ({errno})")]
 pub struct PortGone {
@@ -92,7 +92,7 @@ pub struct PortGone {
     pub errno: Errno,
 }
 
-/// What became of a packet that was to be sent.
+/// What happened to a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sent {
     /// The driver has taken all of it.
@@ -106,8 +106,8 @@ pub enum Sent {
 /// An open port. Reading and writing work through a shared reference, so one thread may read
 /// while another writes (through its own [`PacketWriter`]).
 ///
-/// It is open twice: a read may sleep, so that waiting for bytes and reading them is one system
-/// call; a write must not.
+/// It is opened twice. A read may sleep, so that waiting and reading are one system call. A write
+/// must not sleep.
 pub struct SerialPort {
     reading: OwnedFd,
     writing: OwnedFd,
@@ -130,7 +130,7 @@ impl fmt::Debug for SerialPort {
 const PTY_SLAVES: std::ops::RangeInclusive<u32> = 136..=143;
 
 impl SerialPort {
-    /// Opens `path` at `baud` and throws away what lay in its buffers.
+    /// Opens `path` at `baud` and throws away the bytes in its buffers.
     pub fn open(path: &Path, baud: u32) -> Result<Self, OpenPortError> {
         let fail = |errno| OpenPortError::from_errno(path, errno);
         // Non-blocking also keeps `open` from waiting for a carrier.
@@ -154,18 +154,18 @@ impl SerialPort {
             baud,
         };
         if baud == 0 {
-            // To a driver this means to hang up.
+            // For a driver, 0 baud means to hang up.
             return Err(no_such_speed(Errno::INVAL));
         }
         termios.set_speed(baud).map_err(no_such_speed)?;
         tcsetattr(&writing, OptionalActions::Now, &termios).map_err(fail)?;
-        // The driver reports the speed it has really set.
+        // The driver says which speed it has really set.
         let set = tcgetattr(&writing).map_err(fail)?.output_speed();
         if set.abs_diff(baud) > baud / 50 {
             return Err(no_such_speed(Errno::INVAL));
         }
         let low_latency = low_latency::request(&writing);
-        // The same device whatever `path` leads to by now.
+        // Open the same device again, whatever `path` leads to by now.
         let again = format!("/proc/self/fd/{}", writing.as_raw_fd());
         let reading = open(again, flags, Mode::empty()).map_err(fail)?;
         fcntl_setfl(&reading, OFlags::empty()).map_err(fail)?;
@@ -178,16 +178,15 @@ impl SerialPort {
         })
     }
 
-    /// Whether the driver hands bytes over at once instead of collecting them (some USB adapters
-    /// collect for 16 ms).
+    /// Whether the driver passes on bytes at once. (Some USB adapters collect them for 16 ms.)
     pub fn is_low_latency(&self) -> bool {
         self.low_latency
     }
 
-    /// Reads what comes, up to the buffer's length, and waits for it at most for about `timeout` of
-    /// real time; 0 = nothing has come.
+    /// Reads up to the buffer's length. Waits at most about `timeout` of real time; 0 bytes mean
+    /// that nothing came.
     ///
-    /// A time-out that the driver can keep costs no system call beside the read; it is then kept to
+    /// If the driver can keep the time-out itself, it costs no further system call, and is exact to
     /// a tenth of a second.
     pub fn read(&self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortGone> {
         if timeout < READ && self.poll(timeout)?.is_empty() {
@@ -204,7 +203,7 @@ impl SerialPort {
         }
     }
 
-    /// What there is to find out by reading within `timeout`: bytes, or an end.
+    /// Whether a read within `timeout` would return something: bytes, or an end.
     fn poll(&self, timeout: Duration) -> Result<PollFlags, PortGone> {
         let timeout = Timespec {
             tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
@@ -218,9 +217,9 @@ impl SerialPort {
         }
     }
 
-    /// Throws away what was written and has not left the machine yet.
+    /// Throws away bytes that were written and have not left the machine yet.
     pub fn discard_output(&self) {
-        // The reader finds out that a port no longer works.
+        // The reader finds out if a port does not work any more.
         let _ = tcflush(&self.writing, QueueSelector::OFlush);
     }
 }
@@ -231,14 +230,14 @@ impl AsFd for SerialPort {
     }
 }
 
-/// Takes the port for this process alone, among those that ask for the lock. The lock is on the
+/// Locks the port for this process, against programs that ask for the lock. The lock belongs to the
 /// open file and ends with the process.
 fn lock(fd: &OwnedFd) -> Result<(), Errno> {
     flock(fd, FlockOperation::NonBlockingLockExclusive)
 }
 
-/// Keeps programs away that ask for no lock (TIOCEXCL). On a pseudo terminal this would outlive a
-/// killed process for as long as the other end is open, and shut the restarted bridge out.
+/// Keeps out programs that ask for no lock (TIOCEXCL). Not on a pseudo terminal: there it would
+/// outlive a killed process while the other end is open, and shut out the next bridge.
 fn shut_out_others(fd: &OwnedFd) -> Result<(), Errno> {
     let is_pty = PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev));
     if !is_pty {
@@ -260,12 +259,12 @@ impl OpenPortError {
     }
 }
 
-/// Writes packets to a port, each with one system call, and keeps packets whole when the driver
-/// takes only a part.
+/// Writes packets to a port, each with one system call. If the driver takes only a part, the rest
+/// goes first next time, so packets stay whole.
 #[derive(Debug, Default)]
 pub struct PacketWriter {
     rest: [u8; PACKET_LENGTH],
-    /// How many bytes of `rest` are still to be sent; they are its last ones.
+    /// How many bytes of `rest` must still be sent: its last ones.
     rest_length: usize,
 }
 

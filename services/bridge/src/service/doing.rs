@@ -1,17 +1,19 @@
-//! Carrying out what the core wants: writing, publishing, and the stop word.
+//! Carries out the core's actions: writes, publishes, and sets or clears the stop word.
 //!
-//! It is apart from the turn because everything here has an effect outside this process.
+//! It stands apart from the turn because everything here has an effect outside this process.
 
-use lager_ports::{Cause, Clock, Release, Stop};
+use lager_home::Clock;
+use lager_orders::Moment;
+use lager_ports::Cause;
+use lager_stop::{Release, Stop};
 use lager_wire::{Callsign, PACKET_LENGTH, Version};
 
 use super::Service;
-use crate::events::Moment;
-use crate::machine::{Action, Write};
+use crate::machine::{Effect, Write};
 use crate::serial::{PacketWriter, Sent};
 
 impl Service<'_> {
-    /// Does what there is to do, one action after the other, and looks at the stop word before each
+    /// Does what there is to do, one effect after the other, and looks at the stop word before each
     /// and after the last.
     /// Each is decided upon at the moment of its own: what was decided before this process was
     /// frozen is not done after it.
@@ -22,13 +24,13 @@ impl Service<'_> {
             }
             let now = self.moment();
             match self.core.next(now) {
-                Some(action) => self.carry_out(action, now),
+                Some(effect) => self.carry_out(effect, now),
                 None => return,
             }
         }
     }
 
-    /// Tells those who wait for a stop that this loop turns, and which boards it has.
+    /// Shows a `lager stop` that waits that this loop turns, and which boards it has.
     pub(super) fn answer_stoppers(&self, now_ns: u64) {
         let version = |board| match self.core.version(board) {
             Some(Version::Original) => Some(0),
@@ -48,26 +50,26 @@ impl Service<'_> {
         }
     }
 
-    fn carry_out(&mut self, action: Action, now: Moment) {
-        match action {
-            Action::Discard { place } => self.discard(place),
-            Action::Write(write) => self.write(&write),
-            Action::PublishHealth { rings } => self.publish_health(now, rings),
-            Action::PublishState { report_ns } => self.publish_state(now, report_ns),
-            Action::ShowReport(shown) => {
+    fn carry_out(&mut self, effect: Effect, now: Moment) {
+        match effect {
+            Effect::Discard { place } => self.discard(place),
+            Effect::Write(write) => self.write(&write),
+            Effect::PublishHealth { rings } => self.publish_health(now, rings),
+            Effect::PublishState { report_ns } => self.publish_state(now, report_ns),
+            Effect::ShowReport(shown) => {
                 self.page.report(shown.at_ns, shown.duties);
                 if shown.proves_rest {
                     self.page.rest(shown.at_ns);
                 }
             }
-            // Seen at the next look at the word.
-            Action::Stop(cause) => self.page.stop(cause),
-            Action::Release(stop) => self.release(stop),
-            Action::Say(news) => self.say(&news),
+            // The next look at the word finds it.
+            Effect::Stop(cause) => self.page.stop(cause),
+            Effect::Release(stop) => self.release(stop),
+            Effect::Say(news) => self.say(&news),
         }
     }
 
-    /// Hands a stop to the core before anything else is done.
+    /// Passes a stop to the core before anything else.
     #[cold]
     fn obey(&mut self, stop: Stop) {
         self.page.heed(stop, Clock::monotonic_ns());
@@ -75,7 +77,7 @@ impl Service<'_> {
         tracing::warn!("stopped {stop}; a resume releases it");
     }
 
-    /// Releases this stop; one that was set meanwhile holds.
+    /// Releases this stop. A newer stop stays in force.
     fn release(&mut self, stop: Stop) {
         match self.page.release(stop) {
             Release::NotStopped => self.core.released(true),
@@ -90,7 +92,7 @@ impl Service<'_> {
         }
     }
 
-    /// Throws away what waits in the driver.
+    /// Throws away the bytes that wait in the driver.
     fn discard(&mut self, place: usize) {
         let port = &mut self.ports[place];
         if let Some(device) = &port.device {
@@ -114,13 +116,13 @@ impl Service<'_> {
         }
     }
 
-    /// Writes one packet; whether the driver has taken it.
+    /// Writes one packet. Returns whether the driver has taken it.
     fn put(&mut self, place: usize, packet: &[u8; PACKET_LENGTH]) -> bool {
         let port = &mut self.ports[place];
         let Some(device) = &port.device else {
             return false;
         };
-        // The reader finds out that a port has gone.
+        // The reader finds out if a port has gone.
         matches!(
             port.writer.write(device, packet),
             Ok(Sent::Whole | Sent::Partly)
@@ -129,7 +131,7 @@ impl Service<'_> {
 
     fn publish_health(&mut self, now: Moment, rings: bool) {
         let dropped = u64::from(self.counts.dropped());
-        let lost = self.lost_before + self.orders.lost() + self.inputs.lost() + dropped;
+        let lost = self.lost_before + self.orders.lost() + dropped;
         let sent = self.health.loan().and_then(|mut loan| {
             self.core.fill_health(now.robot, self.counts, &mut loan);
             loan.bus_lost = lost;

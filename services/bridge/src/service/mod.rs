@@ -1,20 +1,21 @@
-//! The bridge as a process: ports, bus, stop word and waiting. It decides nothing; what it does is
-//! what [`BridgeCore`] gives it to do.
+//! The bridge as a process: ports, bus, stop word and waiting. It decides nothing and carries out
+//! the actions of [`BridgeCore`].
 //!
-//! One turn: wait, obey the stop word, take what the readers have brought, answer requests, drain
+//! One turn: wait, obey the stop word, take the readers' events, answer requests, drain
 //! all orders, let the core decide, and carry out its actions in its order. The stop word is read
 //! before each action and after the last one, so before each packet, with one load each. So nothing
 //! that was decided before a stop is written after it, even if this process was frozen meanwhile.
 //!
-//! Nobody is woken in vain. `link/health` rings only when it changes who may move the robot, which
-//! logic must know. The order in force shows on `steering/state` with the board's next report; that
-//! topic rings for reports and for the end of an order. A port is read asleep (`VTIME`), so a frame
-//! costs `read` and `futex` in the reader, a sleep and a ring in logic, a sleep and a `write` in
-//! the main loop, and nothing else: `tests/path` counts them with `strace`.
+//! Nobody is woken in vain. `link/health` rings only when it changes who may move the robot,
+//! because logic must know that. The order in force appears on `steering/state` with the board's
+//! next report; that topic rings for reports and for the end of an order. The thread sleeps in the
+//! read of a port (`VTIME`). So a frame costs `read` and `futex` in the reader, a sleep and a ring
+//! in logic, a sleep and a `write` in the main loop, and nothing else: `tests/path` counts them
+//! with `strace`.
 //!
-//! **Safe state**: standby. It is written when nobody holds a lease, when a stop is latched, and
-//! several times at shutdown. If this process is killed, the steering board halts by itself
-//! within 150 ms.
+//! **Safe state**: standby. The bridge writes it when nobody holds a lease, when a stop is in
+//! force, and several times at shutdown. If this process is killed, the steering board halts by
+//! itself within 150 ms.
 
 mod doing;
 mod saying;
@@ -24,49 +25,62 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use heapless::spsc::{Consumer, Queue};
-use lager_ports::{
-    Bus, Cause, Clock, PortError, Publisher, ReceiveError, Sample, Server, Shutdown, StopPage,
-    Subscriber, Waiter, urgency,
-};
+use lager_home::Clock;
+use lager_orders::{Mode, Moment};
+use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, Sample, Server, Subscriber};
+use lager_sample::Topic;
+use lager_stop::{StopError, StopPage};
 use lager_topics::{
-    Answer, Ask, BridgeRequest, Health, Input, InputKind, LatencyCommand, LinkHealth, Mode,
-    OperatorInput, Origin, SteeringCommand, SteeringState, StopCause, Topic,
+    Ask, BridgeAnswer, BridgeRequest, Health, Input, InputKind, LatencyCommand, LinkHealth,
+    OperatorInput, Origin, SteeringCommand, SteeringState, StopCause,
 };
+use lager_wake::{Shutdown, Waiter, urgency};
 
 use crate::buttons::{self, Opener, Touch};
 use crate::config::BridgeConfig;
 use crate::counts::Counts;
-use crate::events::{Moment, PortEvent};
+use crate::events::PortEvent;
 use crate::latency::CommandMeter;
 use crate::machine::{BridgeCore, CoreOptions};
-use crate::reader::{FromReader, QUEUE, Reader};
+use crate::reader::{Handed, QUEUE, Reader};
 use crate::serial::{PacketWriter, SerialPort};
 
-/// Longest wait for anything, in real time: a wake can be missed, and the shutdown flag is looked
-/// at that often.
+/// Longest wait for anything, in real time: a wake may be missed, and the shutdown flag is checked
+/// that often.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
-/// How long an earlier bridge's state is waited for, in real time.
+/// How long a new bridge waits for the state of the one before, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
 
-/// Touches of the buttons that can wait for the main loop.
+/// How many presses of buttons can wait for the main loop.
 const TOUCHES: usize = 16;
 
 /// How long a shutdown waits for the wheels to stand, in robot time.
 const PARKING: Duration = Duration::from_millis(200);
 
+/// Why the bridge could not begin.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BridgeError {
+    /// One of its ports on the bus could not be opened.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// It cannot use its stop word.
+    #[error(transparent)]
+    Stop(#[from] StopError),
+}
+
 /// Runs the bridge until `shutdown` is requested.
 ///
-/// Ports that cannot be opened are no reason to end: they are tried again for ever, and
-/// `link/health` and the log say so.
+/// If a serial port cannot be opened, the bridge goes on and tries again for ever; `link/health`
+/// and the log say so.
 ///
 /// # Errors
-/// The bridge's place on the bus cannot be had; the sentence says what to do.
-pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), PortError> {
+/// The bridge's ports on the bus, or its stop word, cannot be opened; the sentence says what to do.
+pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), BridgeError> {
     run_with(bus, config, &buttons::open, shutdown)
 }
 
-/// The same where `open` has the buttons' lines, for machines without a chip.
+/// The same; `open` opens the buttons' lines, for machines without a chip.
 ///
 /// # Errors
 /// As with [`run`].
@@ -75,10 +89,10 @@ pub fn run_with(
     config: &BridgeConfig,
     open: &Opener,
     shutdown: &Shutdown,
-) -> Result<(), PortError> {
+) -> Result<(), BridgeError> {
     let kept = if config.resume {
         bus.kept::<LinkHealth>(RESUME_WAIT).unwrap_or_else(|error| {
-            // State that cannot be read counts as lost, and the robot then starts stopped.
+            // A state that cannot be read counts as lost, and the robot then starts stopped.
             tracing::error!("{error}");
             None
         })
@@ -89,7 +103,7 @@ pub fn run_with(
     let kept = kept.map(|(health, stamp)| (health, clock.at(stamp.publish_time_ns)));
     let counts = Counts::new(kept.as_ref().map(|(health, _)| health));
     let end = AtomicBool::new(false);
-    let mut queues: [Queue<FromReader, QUEUE>; 2] = [Queue::new(), Queue::new()];
+    let mut queues: [Queue<Handed, QUEUE>; 2] = [Queue::new(), Queue::new()];
     let [first, second] = &mut queues;
     let (first_in, first_out) = first.split();
     let (second_in, second_out) = second.split();
@@ -99,14 +113,14 @@ pub fn run_with(
     let server = bus.server::<BridgeRequest>()?;
     let events = [first_out, second_out];
     let mut service = Service::new(bus, config, &counts, kept, events, touches)?;
-    let ringer = service.waiter.ringer()?;
+    let ringer = service.waiter.ringer();
     shutdown.wake(ringer.clone());
-    // The word decides whether the robot is stopped. If it is clear although a stop was latched,
-    // the bridge before ended during a release, or somebody has wiped the word.
+    // The word decides whether the robot is stopped. If the state says stopped and the word is
+    // clear, the earlier bridge ended during a release, or somebody has wiped the word.
     if config.resume && kept.is_none_or(|(kept, _)| kept.stopped != 0) {
         service.page.stop(StopCause::StateLost);
     }
-    // Before a thread can bring a board: nothing is written that a stop forbids.
+    // Do this before any thread can bring a board, so that nothing is written that a stop forbids.
     service.act();
     std::thread::scope(|scope| {
         for (place, events) in [first_in, second_in].into_iter().enumerate() {
@@ -115,7 +129,7 @@ pub fn run_with(
             std::thread::Builder::new()
                 .name(["sensor-port", "steering-port"][place].to_owned())
                 .spawn_scoped(scope, move || {
-                    // Logic and the main loop are farther along the path.
+                    // Logic and the main loop come later on the path.
                     urgency::step_back(2, config.waiting);
                     Reader::new(place, port, bus, events, ringer, (counts, end)).run();
                 })
@@ -129,7 +143,8 @@ pub fn run_with(
             let (ringer, end, resume) = (ringer.clone(), &end, kept.is_some());
             let watch = move || {
                 buttons::watch(config, open, resume, end, |touch| {
-                    // A main loop that has not taken so many hangs, and will be replaced.
+                    // A main loop with so many events waiting hangs, and the supervisor will
+                    // replace it.
                     let _ = touched.enqueue(touch);
                     ringer.ring();
                 });
@@ -154,7 +169,7 @@ pub fn run_with(
 
 /// One serial port as the main loop sees it.
 struct Port<'a> {
-    events: Consumer<'a, FromReader>,
+    events: Consumer<'a, Handed>,
     device: Option<Arc<SerialPort>>,
     writer: PacketWriter,
 }
@@ -166,9 +181,8 @@ struct Service<'a> {
     counts: &'a Counts,
     waiter: Waiter,
     orders: Subscriber<SteeringCommand>,
-    inputs: Subscriber<OperatorInput>,
     touches: Consumer<'a, Touch>,
-    /// Where the buttons are told, where there are any.
+    /// Where presses of the buttons are published, if there are buttons.
     touched: Option<Publisher<OperatorInput>>,
     state: Publisher<SteeringState>,
     health: Publisher<LinkHealth>,
@@ -187,23 +201,24 @@ impl<'a> Service<'a> {
         config: &'a BridgeConfig,
         counts: &'a Counts,
         kept: Option<(Health, Duration)>,
-        events: [Consumer<'a, FromReader>; 2],
+        events: [Consumer<'a, Handed>; 2],
         touches: Consumer<'a, Touch>,
-    ) -> Result<Self, PortError> {
+    ) -> Result<Self, BridgeError> {
         let port = |events| Port {
             events,
             device: None,
             writer: PacketWriter::default(),
         };
         let waiter = bus.waiter(config.waiting)?;
-        let path = bus.place().robot(bus.robot()).join(StopPage::FILE);
-        let page = StopPage::open(&path, config.resume, waiter.ringer()?)?;
+        let path = bus.home().unit(bus.unit()).join(StopPage::FILE);
+        let ringer = waiter.ringer();
+        let page = StopPage::open(&path, config.resume, move || ringer.ring())?;
         if let Some((kept, _)) = kept {
             tracing::info!(
                 mode = ?kept.mode,
                 stopped = kept.stopped != 0,
                 order = kept.current_id,
-                "the state of an earlier bridge is taken up"
+                "goes on from the state of an earlier bridge"
             );
         }
         let options = CoreOptions {
@@ -218,7 +233,6 @@ impl<'a> Service<'a> {
             counts,
             waiter,
             orders: bus.subscriber()?,
-            inputs: bus.subscriber()?,
             touches,
             touched: match config.buttons {
                 Some(_) => Some(bus.publisher()?),
@@ -262,16 +276,11 @@ impl<'a> Service<'a> {
     /// Takes what the readers have brought.
     fn take_events(&mut self) {
         for place in 0..self.ports.len() {
-            while let Some(event) = self.ports[place].events.dequeue() {
-                let event = match event {
-                    FromReader::Opened(device) => {
-                        let port = &mut self.ports[place];
-                        port.device = Some(device);
-                        port.writer = PacketWriter::default();
-                        PortEvent::Opened
-                    }
-                    FromReader::Event(event) => event,
-                };
+            while let Some((event, device)) = self.ports[place].events.dequeue() {
+                if device.is_some() {
+                    self.ports[place].device = device;
+                    self.ports[place].writer = PacketWriter::default();
+                }
                 let now = self.moment();
                 self.core.port(now, place, event);
                 self.act();
@@ -282,7 +291,7 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Takes what people have done to the buttons, and tells logic and observers.
+    /// Takes what people have done with the buttons, and tells logic and observers.
     fn take_touches(&mut self) {
         while let Some(touch) = self.touches.dequeue() {
             let kind = match touch {
@@ -304,13 +313,13 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Answers one request; the loop turns until a board has answered it.
-    fn answer(&mut self, ask: &Ask) -> Answer {
+    /// Begins to answer one request. The loop turns until a board has answered.
+    fn answer(&mut self, ask: &Ask) -> BridgeAnswer {
         let now = self.moment();
         self.core.ask(now, ask);
         self.act();
         loop {
-            // An answer is given when its content is in force and published.
+            // The answer goes out when its content is in force and published.
             self.flush();
             if let Some(answer) = self.core.answer() {
                 return answer;
@@ -321,26 +330,16 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Drains orders and buttons completely.
+    /// Takes all orders that wait.
     fn take_orders(&mut self) {
         if self.waiter.has::<SteeringCommand>() {
             while let Some(order) = self.next(|service| service.orders.receive()) {
                 self.take_order(&order);
             }
         }
-        if self.waiter.has::<OperatorInput>() {
-            while let Some(input) = self.next(|service| service.inputs.receive()) {
-                // The other inputs are logic's.
-                if input.kind.get() == Some(InputKind::SwitchPressed) {
-                    let now = self.moment();
-                    self.core
-                        .press(now, input.id, input.stamp().publish_time_ns);
-                }
-            }
-        }
     }
 
-    /// The sample that `receive` has brought.
+    /// The sample that `receive` returns.
     fn next<T: Topic>(
         &mut self,
         receive: impl FnOnce(&mut Self) -> Result<Option<Sample<T>>, ReceiveError>,
@@ -353,10 +352,10 @@ impl<'a> Service<'a> {
 
     fn take_order(&mut self, order: &Sample<SteeringCommand>) {
         let received_ns = Clock::monotonic_ns();
-        // A lease counts from the moment when its origin sent the order, not from when it is read
-        // here.
+        // A lease counts from the moment when its origin sent the order, not when the bridge reads
+        // it.
         let sent_ns = order.stamp().publish_time_ns.min(received_ns);
-        // An order from the future was not dated by this machine's clock.
+        // An order from the future did not get its time from this machine's clock.
         let since_ns = match order.origin.get() {
             Some(Origin::Logic) => sent_ns,
             _ => order.given_ns,

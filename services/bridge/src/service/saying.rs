@@ -1,4 +1,4 @@
-//! The log's sentences for what the core has noticed.
+//! The log's sentences for the events of the core.
 //!
 //! It is apart because the sentences are for people, and tell them what to do.
 
@@ -6,13 +6,13 @@ use lager_topics::ArmProfileState;
 use lager_wire::Callsign;
 
 use super::Service;
-use crate::machine::News;
+use crate::machine::Notice;
 
 impl Service<'_> {
-    pub(super) fn say(&self, news: &News) {
+    pub(super) fn say(&self, news: &Notice) {
         let port = |place: usize| self.config.ports[place].display();
         match *news {
-            News::Up { place, board } => tracing::info!(
+            Notice::Up { place, board } => tracing::info!(
                 port = %port(place),
                 version = ?board.up.version,
                 epoch = board.link_epoch,
@@ -21,29 +21,25 @@ impl Service<'_> {
                 name(board.up.callsign),
                 if board.up.rebooted { "has restarted" } else { "is up" },
             ),
-            News::Silent { place } => {
+            Notice::Silent { place } => {
                 tracing::info!("the board on {} has fallen silent", port(place));
             }
-            News::OriginalBoard { place } => tracing::warn!(
+            Notice::OriginalBoard { place } => tracing::warn!(
                 "the steering board on {} is an original one, whose commands have no age \
                  limit: if this machine dies, it drives on; it is told standby only, unless \
                  `[serial] original_boards = true` accepts that",
                 port(place)
             ),
-            News::KeepsResetting(board) => tracing::error!(
+            Notice::KeepsResetting(board) => tracing::error!(
                 "the {} board keeps resetting; the robot is stopped: look at its power and cables",
                 name(board)
             ),
-            News::Profile(state) => say_profile(state),
-            News::Pressed(mode) => tracing::info!(?mode, "the switch was pressed"),
-            News::ModeSet(mode) => tracing::info!(?mode, "the mode is set"),
-            News::Late(kind) => {
+            Notice::Profile(state) => say_profile(state),
+            Notice::Pressed(mode) => tracing::info!(?mode, "the switch was pressed"),
+            Notice::ModeSet(mode) => tracing::info!(?mode, "the mode is set"),
+            Notice::Late(kind) => {
                 tracing::warn!(?kind, "a request came too late and is not carried out");
             }
-            News::NoReset => tracing::warn!(
-                "the boards cannot be restarted from here: the protocol has no packet for it; \
-                 press the button on the board or switch its power off and on"
-            ),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Original boards: 11-byte packets, end 0xFF, no version byte (U2-U14).
 
-use lager_topics::{Mode, Refusal};
+use lager_orders::Mode;
+use lager_topics::Refusal;
 use lager_wire::{LineState, ResetCause};
 
 use crate::harness::{

@@ -6,8 +6,9 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
 use lager_bridge::buttons::{ButtonsConfig, Lines, Movement};
-use lager_ports::Clock;
-use lager_topics::{Health, Input, InputKind, LinkHealth, Mode, OperatorInput, Refusal, Role};
+use lager_home::Clock;
+use lager_orders::Mode;
+use lager_topics::{Health, Input, InputKind, LinkHealth, OperatorInput, Refusal, Role};
 
 use crate::harness::{
     Bridge, FORWARD, Robot, Seen, SensorBoard, SteeringBoard, operator, wait_until,

@@ -1,17 +1,10 @@
 //! The way of an order: bus, arbiter, packet, board, and back as a report.
 
-use lager_ports::Cause;
-use lager_topics::{
-    AskKind, Calibration, Finish, Health, Input, InputKind, Mode, OperatorInput, Outcome, Refusal,
-    Role, SteeringReport,
-};
+use lager_orders::Mode;
+use lager_topics::{Ask, AskKind, Calibration, Finish, Health, Outcome, Role};
 use lager_wire::{ArmCommand, Command, LineReading, LineState, SettingStatus};
 
-use crate::harness::{
-    FOLLOW, FORWARD, LEFT_PERP, Robot, STANDBY, SensorBoard, SteeringBoard, logic, operator,
-    wait_until,
-};
-use lager_topics::Ask;
+use crate::harness::{FORWARD, Robot, STANDBY, SensorBoard, SteeringBoard, operator, wait_until};
 
 #[test]
 fn both_boards_come_up_and_health_says_so() {
@@ -96,100 +89,10 @@ fn an_order_drives_the_robot_for_as_long_as_it_is_renewed() {
             })
         });
     wait_until("the lease ends", || !steering.with(|board| board.moves()));
-    assert!(
-        steering.with(|board| !board.failsafe),
-        "the bridge halted the robot, not the board"
-    );
     robot.hands.wait_for_state("the end is told", |state| {
         state.finished_id == 1 && state.finish.get() == Some(Finish::Aborted)
     });
     assert_eq!(robot.hands.health.look().unwrap().leases_expired, 1);
-}
-
-#[test]
-fn logic_drives_in_autonomous_mode_and_the_operator_does_not() {
-    let mut robot = Robot::autonomous();
-    robot
-        .hands
-        .give_until(logic(1, FOLLOW), "the wheels turn", |hands| {
-            hands
-                .state
-                .look()
-                .is_some_and(|state| state.left_duty == 100)
-        });
-    let refused = robot.hands.health.look().unwrap().orders_refused;
-    robot.hands.give(operator(1, FORWARD));
-    robot
-        .hands
-        .wait_for_health("the operator's order is counted", |health| {
-            health.orders_refused > refused
-        });
-    assert_eq!(robot.steering.with(|board| board.count(FORWARD)), 0);
-}
-
-#[test]
-fn a_stop_latches_until_a_resume() {
-    let mut robot = Robot::autonomous();
-    let order = logic(1, FOLLOW);
-    robot.hands.give_until(order, "the wheels turn", |hands| {
-        hands
-            .state
-            .look()
-            .is_some_and(|state| state.left_duty == 100)
-    });
-    robot.hands.stop();
-    robot
-        .hands
-        .wait_for_health("the stop is latched", |health| health.stopped == 1);
-    let executed = robot.steering.with(|board| board.executed.len());
-    let commands = robot.steering.with(|board| board.commands);
-    let steering = &robot.steering;
-    // Logic goes on, with this order and with new ones.
-    for id in 1..4 {
-        robot
-            .hands
-            .give_until(logic(id, FOLLOW), "standby is renewed", |_| {
-                steering.with(|board| board.commands > commands + 5 * id as usize)
-            });
-    }
-    assert_eq!(robot.steering.with(|board| board.code), STANDBY.code());
-    assert!(robot.steering.with(|board| {
-        board.executed[executed..]
-            .iter()
-            .all(|code| *code == STANDBY.code())
-    }));
-    let answer = robot.hands.resume();
-    assert_eq!(answer.outcome.get(), Some(Outcome::Done));
-    assert_eq!(answer.stopped, 0);
-    robot
-        .hands
-        .give_until(logic(3, FOLLOW), "the wheels turn again", |hands| {
-            hands
-                .state
-                .look()
-                .is_some_and(|state| state.left_duty == 100)
-        });
-}
-
-#[test]
-fn two_equal_turns_are_two_and_a_refresh_is_none() {
-    let mut robot = Robot::autonomous();
-    let (mut id, mut turns) = (0, 0);
-    for _ in 0..2 {
-        let before = (id, turns);
-        id = robot.hands.carry_out(logic(id + 1, LEFT_PERP));
-        let steering = &robot.steering;
-        let commands = steering.with(|board| board.commands);
-        turns = steering.with(|board| board.count(LEFT_PERP));
-        let (tries, done) = ((id - before.0) as usize, turns - before.1);
-        assert!((1..=tries).contains(&done), "{done} turns for {tries}");
-        robot
-            .hands
-            .give_until(logic(id, LEFT_PERP), "it is refreshed", |_| {
-                steering.with(|board| board.commands > commands + 5)
-            });
-        assert_eq!(robot.steering.with(|board| board.count(LEFT_PERP)), turns);
-    }
 }
 
 #[test]
@@ -206,21 +109,6 @@ fn the_servos_of_an_arm_step_are_known_when_it_ends() {
             done
         })
     });
-}
-
-#[test]
-fn an_undefined_code_is_refused_and_counted() {
-    let mut robot = Robot::up();
-    let mut order = operator(1, FORWARD);
-    order.code = 0x0C;
-    robot.hands.give(order);
-    robot
-        .hands
-        .wait_for_health("it is counted", |health| health.orders_refused == 1);
-    robot.hands.wait_for_state("its origin is told", |state| {
-        state.finished_id == 1 && state.finish.get() == Some(Finish::Refused)
-    });
-    assert!(!robot.steering.with(|board| board.moves()));
 }
 
 #[test]
@@ -294,27 +182,6 @@ fn a_calibration_is_answered_by_the_sensor_board_or_given_up() {
 }
 
 #[test]
-fn one_that_drives_by_itself_is_not_calibrated() {
-    let mut robot = Robot::autonomous();
-    let ask = Ask {
-        kind: AskKind::Calibrate.into(),
-        ..Ask::default()
-    };
-    let asked = || {
-        robot.hands.give(logic(1, FOLLOW));
-        robot.hands.ask(ask).outcome.get()
-    };
-    wait_until("it is refused while the wheels turn", || {
-        asked() == Some(Outcome::UnderWay)
-    });
-    robot.hands.stop();
-    robot
-        .hands
-        .wait_for_health("the stop is latched", |health| health.stopped == 1);
-    assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::Done));
-}
-
-#[test]
 fn the_robot_can_be_steered_while_a_board_is_asked() {
     let mut robot = Robot::up();
     robot.sensor.with(|board| board.deaf = true);
@@ -333,21 +200,8 @@ fn the_robot_can_be_steered_while_a_board_is_asked() {
                 asked.is_finished()
             });
     });
-    assert!(!robot.steering.with(|board| board.failsafe));
+    assert!(!robot.steering.with(|board| board.register.failsafe));
     assert!(robot.steering.with(|board| board.count(FORWARD)) == 1);
-}
-
-#[test]
-fn boards_cannot_be_reset_and_unknown_requests_are_refused() {
-    let robot = Robot::up();
-    for kind in [AskKind::ResetBoards.into(), lager_topics::Tag::from_raw(77)] {
-        let answer = robot.hands.ask(Ask {
-            kind,
-            ..Ask::default()
-        });
-        assert_eq!(answer.outcome.get(), Some(Outcome::Refused));
-    }
-    assert_eq!(robot.sensor.with(|board| board.restarts), 0);
 }
 
 #[test]
@@ -363,118 +217,6 @@ fn settings_without_a_board_are_answered_so() {
         ..Ask::default()
     });
     assert_eq!(answer.outcome.get(), Some(Outcome::NoBoard));
-}
-
-#[test]
-fn each_press_of_the_switch_changes_the_mode_once() {
-    let mut robot = Robot::up();
-    let buttons = robot
-        .isolation
-        .open(Role::Operator)
-        .publisher::<OperatorInput>()
-        .unwrap();
-    let press = |id| {
-        let input = Input {
-            kind: InputKind::SwitchPressed.into(),
-            id,
-            ..Input::default()
-        };
-        buttons.send(Cause::OWN, input).unwrap();
-    };
-    for (id, mode) in [(7, Mode::Autonomous), (8, Mode::Manual)] {
-        press(id);
-        robot
-            .hands
-            .wait_for_health("the mode has changed", |health| {
-                health.mode.get() == Some(mode)
-            });
-        // A repeated sample is no second press, nor is one without a number.
-        for repeated in [id, 7, 0] {
-            press(repeated);
-        }
-        let health = robot
-            .hands
-            .wait_for_health("it is known", |health| health.switch_ids[0] == id);
-        assert_eq!(health.mode.get(), Some(mode));
-    }
-    press(9);
-    robot
-        .hands
-        .wait_for_health("the last press has come", |health| {
-            health.switch_ids[0] == 9
-        });
-    let health = robot.hands.health.look().unwrap();
-    assert_eq!(health.mode.get(), Some(Mode::Autonomous), "three presses");
-    assert_eq!(health.switch_ids, [9, 8, 7, 0]);
-}
-
-#[test]
-fn a_board_that_does_not_report_is_not_driven_and_its_last_report_grows_old() {
-    for logic_drives in [false, true] {
-        let mut robot = if logic_drives {
-            Robot::autonomous()
-        } else {
-            Robot::up()
-        };
-        let steering = &robot.steering;
-        let order = if logic_drives {
-            logic(1, FOLLOW)
-        } else {
-            operator(1, FORWARD)
-        };
-        let fresh = |state: &SteeringReport| state.left_duty == 100 && state.age_ms < 200;
-        robot.hands.give_until(order, "the wheels turn", |hands| {
-            hands.state.look().is_some_and(|state| fresh(&state))
-        });
-        robot.hands.state.drain();
-        steering.with(|board| board.mute = true);
-        robot.hands.give_until(order, "the wheels stand", |_| {
-            steering.with(|board| !board.moves())
-        });
-        assert!(
-            steering.with(|board| !board.failsafe),
-            "the bridge halted the robot, not the board"
-        );
-        let health = robot.hands.wait_for_health("people see why", |health| {
-            health.blocked.get() == Some(Refusal::BoardSilent)
-        });
-        assert_eq!(health.steering.up, 1, "its link is up all the same");
-        let executed = steering.with(|board| board.executed.len());
-        let commands = steering.with(|board| board.commands);
-        robot.hands.give_until(order, "standby goes on", |_| {
-            steering.with(|board| board.commands > commands + 10)
-        });
-        assert!(steering.with(|board| {
-            let mut since = board.executed[executed..].iter();
-            since.all(|code| *code == STANDBY.code())
-        }));
-        let frozen = robot.hands.state.drain();
-        let last = frozen.last().expect("the end of the order was told");
-        assert_eq!(last.left_duty, 100, "as last heard");
-        assert!(last.age_ms >= 200, "{}", last.age_ms);
-
-        steering.with(|board| board.mute = false);
-        robot
-            .hands
-            .give_until(order, "its origin is told that it is over", |hands| {
-                hands.health.look().is_some_and(|health| {
-                    health.blocked.get() == Some(Refusal::None) && health.finished_id == 1
-                })
-            });
-        let commands = steering.with(|board| board.commands);
-        robot.hands.give_until(order, "standby goes on", |_| {
-            steering.with(|board| board.commands > commands + 10)
-        });
-        assert!(!steering.with(|board| board.moves()));
-        let new = if logic_drives {
-            logic(2, FOLLOW)
-        } else {
-            operator(2, FORWARD)
-        };
-        robot.hands.give_until(new, "a new order drives", |_| {
-            steering.with(|board| board.moves())
-        });
-    }
 }
 
 #[test]
@@ -507,40 +249,17 @@ fn a_clean_stop_leaves_the_robot_in_standby() {
                 .is_some_and(|state| state.left_duty == 100)
         });
     robot.hands.give(operator(1, FORWARD));
-    robot.steering.with(|board| board.halted = false);
+    robot.steering.with(|board| board.register.halted = false);
     robot.bridge.take().unwrap().stop();
-    let (moves, halted, last) = robot
-        .steering
-        .with(|board| (board.moves(), board.halted, *board.executed.last().unwrap()));
+    let (moves, halted, last) = robot.steering.with(|board| {
+        (
+            board.moves(),
+            board.register.halted,
+            *board.register.executed.last().unwrap(),
+        )
+    });
     assert!(!moves && !halted);
     assert_eq!(last, STANDBY.code());
     let health = robot.hands.health.look().unwrap();
     assert_eq!(health.current_code, 0);
-}
-
-#[test]
-fn a_setpoint_the_board_gave_up_does_not_set_it_off_again() {
-    let mut robot = Robot::up();
-    let steering = &robot.steering;
-    let order = operator(1, FORWARD);
-    robot.hands.give_until(order, "the wheels turn", |_| {
-        steering.with(|board| board.moves())
-    });
-    // As if all commands of 150 ms had been lost.
-    steering.with(|board| {
-        board.failsafe = true;
-        board.code = STANDBY.code();
-    });
-    robot
-        .hands
-        .give_until(order, "the person is told that it is over", |hands| {
-            let health = hands.health.look();
-            health.is_some_and(|health| health.finished_id == 1)
-        });
-    assert!(!steering.with(|board| board.moves()));
-    robot
-        .hands
-        .give_until(operator(2, FORWARD), "the wheels turn again", |_| {
-            steering.with(|board| board.moves())
-        });
 }

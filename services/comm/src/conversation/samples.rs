@@ -1,70 +1,74 @@
-//! What the robot does, as its other services tell it.
+//! Takes the samples of the robot's other services.
 
-use lager_lines::Coord;
+use lager_floor::Node;
 use lager_lines::conversation::RobotLine;
 use lager_lines::extension::{EventKind, Report};
+use lager_orders::{Code, Moment, Reason};
+use lager_sample::Stamp;
 use lager_topics::{
-    Answer, Event, Health, NavigatorStatus, OrderQueue, Role, Route, SteeringReport, Thought,
+    BridgeAnswer, Event, Health, NavigatorStatus, OrderQueue, Role, Route, SteeringReport, Thought,
     WorldAnswer,
 };
 
-use super::{AGAIN, Conversation, STOPPED};
+use super::{AGAIN, Asker, Conversation, STOPPED};
 use crate::known::Senses;
-use crate::map::direction;
-use crate::moment::Moment;
-use crate::telling;
+use crate::{speech, telling};
 
 impl Conversation {
-    /// The bridge has told who may steer.
+    /// The bridge says who may steer.
     pub fn health(&mut self, now: Moment, health: &Health) {
         let before = self.known.health.replace(*health);
         self.note(now, before.as_ref(), health);
         let mode_before = before.and_then(|before| before.mode.get());
         if self.known.mode() != mode_before {
-            // What was begun in one mode has no meaning in the other.
-            self.driving.let_go("the mode has been changed");
+            // An action of one mode has no meaning in the other.
+            self.driving.let_go(Code::ModeChanged);
             self.held.clear();
         }
         self.driving.refused(now.robot, health);
         if health.stopped != 0 && self.driving.let_go(STOPPED) {
             self.think(STOPPED);
         }
-        self.tasks.health(health);
+        self.orders.health(health);
         self.settle();
         self.ask(now);
     }
 
-    /// Logic has told where it is and what it does, in a sample that was published at this moment.
+    /// Logic says where it is and what it does, in a sample that was published at this moment.
     pub fn status(&mut self, now: Moment, status: &NavigatorStatus, published_ns: u64) {
         self.known.status = Some(*status);
-        self.tasks.status(status, published_ns);
+        self.orders.status(status, published_ns);
         self.settle();
         if let Some(heading) = status.heading.get() {
-            let line = self.told.looks(direction(heading));
+            let line = self.told.looks(heading);
             self.say_if_up(line);
         }
         self.ask(now);
     }
 
-    /// Logic has told what it will fetch.
+    /// Logic says what it will fetch.
     pub fn queue(&mut self, now: Moment, queue: &OrderQueue) {
         self.known.queue = Some(*queue);
-        self.tasks.queue(now, queue, &mut self.ids);
+        self.orders.queue(now, queue);
         self.settle();
         self.ask(now);
     }
 
     /// Something has happened on a mission.
     pub fn event(&mut self, now: Moment, event: &Event) {
-        let waited = (self.tasks.has_order(), self.tasks.has_picked());
-        self.tasks.event(event);
-        if waited != (self.tasks.has_order(), self.tasks.has_picked()) {
-            // It was refused.
+        let waited = (self.is_ordering(), self.orders.has_picked());
+        self.orders.event(event);
+        // A person who answered a question gets the reason from logic, in a thought.
+        let mut ended = self.orders.ended();
+        ended.retain(|ended| ended.whose != Asker::Question);
+        if waited != (self.is_ordering(), self.orders.has_picked()) {
+            // The order was refused.
             self.ask_from_ns = now.ns + AGAIN;
         }
         if let Some(report) = telling::event(event, &self.known) {
             self.remember(now, report);
         }
+        self.tell_ended(ended);
         self.settle();
         self.ask(now);
     }
@@ -73,7 +77,7 @@ impl Conversation {
     pub fn report(&mut self, now: Moment, report: &SteeringReport) {
         self.known.report = Some(*report);
         self.driving.reported(now.robot, report);
-        // The board's own words, which have just come.
+        // Use the board's report, which has just come.
         let stands = (report.left_duty, report.right_duty, report.age_ms) == (0, 0, 0);
         if self.known.is_stopped() && stands && self.known.board_tells_duties() {
             for (number, since) in core::mem::take(&mut self.stops) {
@@ -91,7 +95,7 @@ impl Conversation {
     /// Logic has planned another way.
     pub fn route(&mut self, route: &Route) {
         if let Some(node) = route.nodes().first() {
-            let line = self.told.node(Coord {
+            let line = self.told.node(Node {
                 x: node.x,
                 y: node.y,
             });
@@ -100,7 +104,7 @@ impl Conversation {
         self.known.route = Some(Box::new(*route));
     }
 
-    /// What is new of that which only the extension tells.
+    /// New samples of topics that only the extension uses.
     pub fn senses(&mut self, new: Senses) {
         self.known.is_simulated |= new.truth.is_some();
         let known = &mut self.known.senses;
@@ -118,26 +122,29 @@ impl Conversation {
             ..Moment::default()
         };
         self.remember(now, telling::thinks(thought));
-        self.think(&thought.to_string());
+        self.say_if_up(Some(speech::thought(&thought.to_string())));
     }
 
-    /// A service has published, whose life began then by its samples' stamps.
-    pub fn lives(&mut self, now: Moment, service: Role, since: u64) {
-        if self
-            .lives
-            .insert(service, since)
-            .is_some_and(|before| before != since)
-        {
+    /// A service has published a sample with this stamp, which says when the service began. A sample
+    /// that is older than its writer is no news: the attendant hands a dead service's last one on.
+    pub fn lives(&mut self, now: Moment, service: Role, stamp: &Stamp) {
+        let since = stamp.epoch;
+        let before = self.lives.get(&service).copied();
+        if stamp.publish_time_ns < since || before.is_some_and(|before| since <= before) {
+            return;
+        }
+        self.lives.insert(service, since);
+        if before.is_some() {
             self.happened(now, EventKind::Restarted, service.as_str());
         }
     }
 
-    /// This process itself has been started anew.
+    /// This process itself has started again.
     pub fn lives_again(&mut self, now: Moment) {
         self.happened(now, EventKind::Restarted, Role::Comm.as_str());
     }
 
-    /// Tells what of the bridge's word is news to a person: stops and who may drive.
+    /// Tells people the bridge's news: stops, and who may drive.
     fn note(&mut self, now: Moment, before: Option<&Health>, health: &Health) {
         let Some(before) = before else { return };
         let is_another = before.stopped_at_ns != health.stopped_at_ns;
@@ -147,7 +154,7 @@ impl Conversation {
             self.happened(now, EventKind::Resumed, "");
         }
         if let Some(mode) = health.mode.get().filter(|_| before.mode != health.mode) {
-            self.happened(now, EventKind::Mode, telling::mode(mode).as_str());
+            self.happened(now, EventKind::Mode, mode.as_str());
         }
     }
 
@@ -156,7 +163,7 @@ impl Conversation {
         self.remember(now, report);
     }
 
-    /// Tells it to a station that speaks the extension, and keeps it for one that comes later.
+    /// Tells it to a station that speaks the extension, and keeps it for a later one.
     fn remember(&mut self, now: Moment, report: Report) {
         self.memory.keep(now.ns, report.clone());
         if self.is_extended {
@@ -164,20 +171,21 @@ impl Conversation {
         }
     }
 
-    /// What became of an [`Action::Ask`]; `Err` is why nobody knows.
-    pub fn answered_by_bridge(&mut self, id: u32, answer: Result<Answer, String>) {
-        self.tasks.answered(id, answer, &self.known);
+    /// The answer to a request to the bridge; `Err` is why there is none.
+    pub fn answered_by_bridge(&mut self, id: u32, answer: Result<BridgeAnswer, Reason>) {
+        let seen = self.known.seen();
+        self.orders.answered(id, answer, &seen);
         self.settle();
     }
 
-    /// What became of an [`Action::AskWorld`]; `Err` is why nobody knows.
+    /// The answer to a request to the simulated world; `Err` is why there is none.
     pub fn answered_by_world(
         &mut self,
         now: Moment,
         id: u32,
-        answer: &Result<WorldAnswer, String>,
+        answer: &Result<WorldAnswer, Reason>,
     ) {
-        self.tasks.world_answered(now, id, answer);
+        self.orders.world_answered(now, id, answer);
         self.settle();
     }
 }

@@ -1,29 +1,25 @@
-//! What is said to the external computer: answers to actions, thoughts, and what cannot be done.
+//! The lines to the external computer: answers to actions, thoughts, and refusals.
 
 use lager_lines::conversation::RobotLine;
 use lager_lines::extension::Report;
+use lager_operator::Ended;
+use lager_orders::{Moment, Reason};
 
-use super::{AGAIN, Conversation};
-use crate::action::Action;
-use crate::moment::Moment;
+use super::{AGAIN, Asker, Conversation};
+use crate::effect::Effect;
 use crate::speech;
-use crate::tasks::Asker;
 
 impl Conversation {
-    /// Does what tasks want done, and says how they and commands have ended.
+    /// Does what the orders want, and says how they and commands have ended.
     pub(super) fn settle(&mut self) {
-        self.actions.append(&mut self.tasks.actions());
-        for ended in self.tasks.ended() {
-            match (ended.asker, ended.result) {
-                (Asker::Action(number), result) => self.reply(number, result),
-                (Asker::Question, Err(why)) => self.think(&why),
-                (Asker::Question, Ok(())) => {}
-            }
-        }
+        self.effects
+            .extend(self.orders.acts().into_iter().map(Effect::Do));
+        let ended = self.orders.ended();
+        self.tell_ended(ended);
         for ended in self.driving.ended() {
             match &ended.result {
                 Err(why) if ended.numbers.is_empty() => {
-                    self.think(why);
+                    self.think(why.clone());
                     if self.held.get().is_none() {
                         self.ask_from_ns = self.turned_ns + AGAIN;
                     }
@@ -37,21 +33,32 @@ impl Conversation {
         }
     }
 
-    /// Whether it is time to tell a station that speaks the extension what the robot does.
+    /// Says how orders have ended.
+    pub(super) fn tell_ended(&mut self, ended: Vec<Ended<Asker>>) {
+        for ended in ended {
+            match (ended.whose, ended.result) {
+                (Asker::Action(number), result) => self.reply(number, result),
+                (Asker::Question, Err(why)) => self.think(why),
+                (Asker::Question, Ok(())) => {}
+            }
+        }
+    }
+
+    /// Whether the state must be told again to a station that speaks the extension.
     pub fn is_to_tell(&self, now: Moment) -> bool {
         self.is_up && self.is_extended && self.telling.is_due(now)
     }
 
-    /// Tells it, as far as it is known now.
+    /// Tells the state as it is known now.
     pub fn tell(&mut self, now: Moment) {
         if self.is_to_tell(now) {
             let reports = self.telling.reports(now, &mut self.known);
-            self.actions.extend(reports.into_iter().map(Action::Show));
+            self.effects.extend(reports.into_iter().map(Effect::Show));
         }
     }
 
     /// Answers an action.
-    pub(super) fn reply(&mut self, number: u32, result: Result<(), String>) {
+    pub(super) fn reply(&mut self, number: u32, result: Result<(), Reason>) {
         let report = match result {
             Ok(()) => Report::Done { number },
             Err(why) => Report::Refused {
@@ -62,15 +69,19 @@ impl Conversation {
         self.say_if_up(Some(RobotLine::Report(report)));
     }
 
-    /// Tells what cannot be done; whatever is wanted then is asked a little later.
-    pub(super) fn correct(&mut self, now: Moment, why: &str) {
+    /// Says that something is impossible. The robot asks again a little later.
+    pub(super) fn correct(&mut self, now: Moment, why: impl Into<Reason>) {
         self.think(why);
         self.held.clear();
         self.ask_from_ns = now.ns + AGAIN;
     }
 
-    pub(super) fn think(&mut self, sentence: &str) {
-        self.say_if_up(Some(speech::thought(sentence)));
+    /// Says why something is not done. A station that speaks the extension gets the code first.
+    pub(super) fn think(&mut self, why: impl Into<Reason>) {
+        let why = why.into();
+        let because = RobotLine::Report(Report::Because(speech::reason(&why)));
+        self.say_if_up(self.is_extended.then_some(because));
+        self.say_if_up(Some(speech::thought(&why.to_string())));
     }
 
     pub(super) fn say_if_up(&mut self, line: Option<RobotLine>) {
@@ -80,6 +91,6 @@ impl Conversation {
     }
 
     pub(super) fn say(&mut self, line: RobotLine) {
-        self.actions.push(Action::Say(line));
+        self.effects.push(Effect::Say(line));
     }
 }

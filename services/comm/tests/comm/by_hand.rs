@@ -1,6 +1,7 @@
 //! Manual: what is renewed, what is awaited, and everything that makes the robot stand.
 
-use lager_topics::{Finish, Mode, Origin, Phase, Refusal, SteeringReport};
+use lager_orders::Mode;
+use lager_topics::{Finish, Origin, Phase, Refusal, SteeringReport};
 
 use crate::robot::Robot;
 
@@ -200,7 +201,7 @@ fn a_refusal_and_an_end_say_why() {
     robot.health.blocked = Refusal::StopLatched.into();
     robot.told();
     let said = robot.hears(&["styrcomm 3"]);
-    assert!(said[0].contains("`lager resume`"), "{said:?}");
+    assert!(said[0].ends_with("the robot is stopped"), "{said:?}");
     robot.health.blocked = Refusal::None.into();
     robot.told();
     robot.pass(210);

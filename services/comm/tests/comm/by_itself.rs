@@ -2,8 +2,9 @@
 
 use lager_comm::LinkLost;
 use lager_lines::splitter::LineError;
+use lager_orders::Mode;
 use lager_topics::{
-    Event, EventKind, Finish, Hold, Mode, NavigatorStatus, Order, Origin, Phase, SteeringReport,
+    Event, EventKind, Finish, Hold, NavigatorStatus, Order, Origin, Phase, SteeringReport,
 };
 
 use crate::robot::Robot;

@@ -2,14 +2,16 @@
 
 use core::time::Duration;
 
-use lager_comm::{Action, Conversation, LinkLost, Moment};
+use lager_comm::{Conversation, Effect, LinkLost};
 use lager_lines::conversation::RobotLine;
-use lager_lines::extension::Hello;
+use lager_lines::extension::{Hello, Report};
 use lager_lines::gag::Query;
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
+use lager_operator::Act;
+use lager_orders::{Mode, Moment, Reason};
 use lager_topics::{
-    Ask, Health, Input, InputKind, Mode, NavigatorStatus, Order, OrderQueue, Origin, Phase,
+    Ask, Health, Input, InputKind, NavigatorStatus, Order, OrderQueue, Origin, Phase,
     SteeringReport, WarehouseMap, WorldAsk,
 };
 
@@ -24,6 +26,8 @@ pub(crate) struct Robot {
     pub(crate) steered: Option<(u32, u8)>,
     /// When it was given, in ns.
     pub(crate) given_ns: u64,
+    /// Why it has said its last thought, where it has said that.
+    pub(crate) because: Option<Reason>,
     /// What was pressed last.
     pub(crate) pressed: Option<Input>,
     /// What was asked last, with the number of the answer.
@@ -64,6 +68,7 @@ impl Robot {
             steered: None,
             given_ns: 0,
             pressed: None,
+            because: None,
             asked: None,
             asked_world: None,
             signed_ms: None,
@@ -106,13 +111,13 @@ impl Robot {
         self.hears(&[&echo])
     }
 
-    /// What has been done since the last look: lines as they are but for signs, other actions in
+    /// What has been done since the last look: lines as they are but for signs, other effects in
     /// brackets.
     pub(crate) fn done(&mut self) -> Vec<String> {
         let mut done = Vec::new();
-        for action in self.conversation.actions() {
-            done.push(match action {
-                Action::Say(RobotLine::Hello(Hello {
+        for effect in self.conversation.effects() {
+            done.push(match effect {
+                Effect::Say(RobotLine::Hello(Hello {
                     clock_ms: Some(clock_ms),
                     ..
                 })) => {
@@ -120,38 +125,46 @@ impl Robot {
                     self.signs += 1;
                     continue;
                 }
-                Action::Say(line) => to_line(&line).expect("it fits").trim_end().to_owned(),
-                Action::HangUp(_) => "[hangs up]".into(),
-                Action::Map(map) => {
+                // Tests read what the page makes of a code.
+                Effect::Say(RobotLine::Report(Report::Refused { number, reason })) => {
+                    format!("refused {number} {reason}")
+                }
+                Effect::Say(RobotLine::Report(Report::Because(reason))) => {
+                    self.because = Some(reason);
+                    continue;
+                }
+                Effect::Say(line) => to_line(&line).expect("it fits").trim_end().to_owned(),
+                Effect::HangUp(_) => "[hangs up]".into(),
+                Effect::Map(map) => {
                     let said = format!("[map {}x{}]", map.width, map.height);
                     self.map = Some(map);
                     said
                 }
-                Action::Order(order) => {
+                Effect::Do(Act::Order(order)) => {
                     self.ordered = Some(order);
                     format!("[orders {}]", order.product)
                 }
-                Action::Press(input) => {
+                Effect::Do(Act::Press(input)) => {
                     self.pressed = Some(input);
                     match input.kind.get() {
                         Some(InputKind::PickupDone) => "[picked]".into(),
                         _ => format!("[presses {}]", input.kind),
                     }
                 }
-                Action::Show(report) => {
+                Effect::Show(report) => {
                     let line = to_line(&report).expect("it fits");
                     self.shown.push(line.trim_end().to_owned());
                     continue;
                 }
-                Action::Ask { id, ask } => {
+                Effect::Do(Act::Ask { id, ask }) => {
                     self.asked = Some((id, ask));
                     format!("[asks {}]", ask.kind)
                 }
-                Action::AskWorld { id, ask } => {
+                Effect::Do(Act::AskWorld { id, ask }) => {
                     self.asked_world = Some((id, ask));
                     format!("[asks the world {}]", ask.kind)
                 }
-                Action::Steer(order) => {
+                Effect::Steer(order) => {
                     assert_eq!(order.origin.get(), Some(Origin::Operator));
                     let renewed = self.steered == Some((order.id, order.code));
                     self.steered = Some((order.id, order.code));
@@ -161,7 +174,7 @@ impl Robot {
                         false => format!("[steers {}]", order.code),
                     }
                 }
-                Action::Stop => "[stops]".into(),
+                Effect::Stop => "[stops]".into(),
             });
         }
         done

@@ -1,27 +1,28 @@
-//! `lager bag play --verify`: the one place where recorder and navigator meet, and what people are
-//! told of it.
+//! `lager bag play --verify`: connects recorder and navigator, and writes sentences for people.
+//! Only this file knows both.
 
 use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use lager_logic::{Answer, Replay, ReplayError};
+use lager_logic::{Replay, ReplayError, Replayed};
 use lager_recorder::{
     Did, Difference, Gap, OfTopic, Rerun, Verified, VerifyError, Why, verify as verify_file,
 };
-use lager_topics::{SteeringReport, Told, ToldKind};
+use lager_supervisor::console;
+use lager_topics::{Beside, NavigatorInput, NavigatorInputKind};
 use lager_wire::Command;
 use serde_json::{Value, json};
 
 use crate::exit;
 
-/// The navigator of this build, as the recorder tells it.
+/// The navigator of this build, as the recorder sees it.
 struct Again {
     changes: Vec<(String, String)>,
     replay: Option<Replay>,
-    /// On what kind of processor the recorded one ran.
+    /// The kind of processor on which the recorded navigator ran.
     processor: String,
-    /// A change was refused, which is the user's fault.
+    /// The navigator refused a change, which is the user's fault.
     is_usage: bool,
 }
 
@@ -43,16 +44,16 @@ impl Rerun for Again {
             .map_err(|error| error.to_string())
     }
 
-    fn handle(&mut self, told: &Told, report: Option<&SteeringReport>) -> Result<Did, String> {
-        let answer = self.begun()?.handle(told, report);
-        let Answer {
-            told,
+    fn handle(&mut self, entry: &NavigatorInput, beside: Beside<'_>) -> Result<Did, String> {
+        let answer = self.begun()?.handle(entry, beside);
+        let Replayed {
+            entry,
             command,
             status,
             events,
         } = answer.map_err(|error| error.to_string())?;
         Ok(Did {
-            told,
+            entry,
             command,
             status,
             events: events.to_vec(),
@@ -68,7 +69,7 @@ impl Again {
     }
 }
 
-/// Verifies `file` with other values for the constants in `changes`; prints what came of it.
+/// Verifies `file` with other values for the constants in `changes`, and prints the result.
 pub fn verify(file: &Path, changes: Vec<(String, String)>, as_json: bool) -> Result<ExitCode> {
     let mut again = Again {
         changes,
@@ -82,10 +83,10 @@ pub fn verify(file: &Path, changes: Vec<(String, String)>, as_json: bool) -> Res
         other => anyhow::anyhow!("{}: {other}", file.display()),
     })?;
     if as_json {
-        crate::say(&to_json(file, &verified, &again.processor).to_string())?;
+        console::print(&to_json(file, &verified, &again.processor).to_string())?;
     } else {
         for line in lines(&verified, &again.processor) {
-            crate::say(&format!("{}: {line}", file.display()))?;
+            console::print(&format!("{}: {line}", file.display()))?;
         }
     }
     match verified.is_identical() {
@@ -94,7 +95,7 @@ pub fn verify(file: &Path, changes: Vec<(String, String)>, as_json: bool) -> Res
     }
 }
 
-/// What people read.
+/// The result for people.
 fn lines(verified: &Verified, processor: &str) -> Vec<String> {
     let mut lines = Vec::new();
     let Verified {
@@ -208,26 +209,26 @@ fn commands(difference: &Difference) -> (String, String) {
     }
 }
 
-fn order(told: &Told) -> String {
-    let granted = match told.arm_granted {
+fn order(entry: &NavigatorInput) -> String {
+    let granted = match entry.arm_granted {
         0 => "",
         _ => ", with the arm left to the operator",
     };
-    match Command::from_code(told.code) {
-        Some(command) => format!("order {}, {command:?}{granted}", told.command_id),
-        None if told.code == 0 => "no order".to_owned(),
-        None => format!("order {}, code {}", told.command_id, told.code),
+    match Command::from_code(entry.code) {
+        Some(command) => format!("order {}, {command:?}{granted}", entry.command_id),
+        None if entry.code == 0 => "no order".to_owned(),
+        None => format!("order {}, code {}", entry.command_id, entry.code),
     }
 }
 
 fn place(difference: &Difference) -> String {
-    let told = &difference.recorded;
-    let kind = told.kind.get().unwrap_or(ToldKind::None);
+    let entry = &difference.recorded;
+    let kind = entry.kind.get().unwrap_or(NavigatorInputKind::None);
     format!(
         "{} s (input {}, {kind:?}, at {} s of robot time)",
         seconds(difference.at_ns),
         difference.number,
-        seconds(told.time_ns)
+        seconds(entry.time_ns)
     )
 }
 

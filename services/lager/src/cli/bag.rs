@@ -23,28 +23,28 @@ pub struct BagArgs {
     /// What to do
     #[command(subcommand)]
     pub command: BagCommand,
-    /// Print JSON, one value a line
+    /// Print JSON, one value in each line
     #[arg(long, global = true, help_heading = "Output")]
     pub json: bool,
 }
 
-/// What is done with recordings.
+/// What to do with recordings.
 #[derive(Debug, Subcommand)]
 pub enum BagCommand {
     /// Record topics into a file until Ctrl-C or SIGTERM
     Record(RecordArgs),
-    /// Size, times, topics and losses, from the file's end if that says so
+    /// Print size, times, topics and losses of a recording
     Info {
         /// The recording
         file: PathBuf,
     },
-    /// Read everything: every CRC, every number, every sum; 1 if anything is wrong
+    /// Check every CRC, every number and every sum; exits with 1 if anything is wrong
     Check {
         /// The recordings
         #[arg(required = true)]
         file: Vec<PathBuf>,
     },
-    /// Copy what is whole of a file that was cut off or damaged, and read the copy again
+    /// Copy the undamaged parts of a damaged file, and check the copy
     Recover {
         /// The recording, which stays as it is
         file: PathBuf,
@@ -52,7 +52,7 @@ pub enum BagCommand {
         #[arg(long, value_name = "COPY")]
         output: Option<PathBuf>,
     },
-    /// Play a recording onto the bus of a robot that is not up; no robot moves by it
+    /// Play a recording onto the bus of a robot that is not up; this moves no robot
     Play(PlayArgs),
     /// Write a table for each topic
     Export {
@@ -61,7 +61,7 @@ pub enum BagCommand {
         /// Write TOPIC.csv for each topic into this folder
         #[arg(long, value_name = "FOLDER", required = true)]
         csv: PathBuf,
-        /// Only this topic; may be given again [default: all]
+        /// Only this topic; may be given several times [default: all]
         #[arg(long, value_name = "TOPIC")]
         topic: Vec<String>,
     },
@@ -70,18 +70,18 @@ pub enum BagCommand {
 /// `lager bag record`.
 #[derive(Debug, Args)]
 pub struct RecordArgs {
-    /// The file, which must not be there yet [default: ROBOT-DATE.mcap, or -2 if that is there]
+    /// The new file [default: ROBOT-DATE.mcap, or ROBOT-DATE-2.mcap if that exists]
     pub file: Option<PathBuf>,
-    /// Only this topic; may be given again [default: all, also those that come later]
+    /// Only this topic; may be given several times [default: all, also those that come later]
     #[arg(long, value_name = "TOPIC", value_parser = values::TopicName, hide_possible_values = true)]
     pub topic: Vec<String>,
-    /// Begin a new file, FILE-001.mcap, when one has so many MiB
+    /// Begin a new file (FILE-001.mcap, ...) when a file has this many MiB
     #[arg(long, value_name = "MIB", allow_negative_numbers = true, value_parser = values::split_size)]
     pub split_size: Option<u64>,
-    /// Begin a new file when one has been written to for so many seconds
+    /// Begin a new file after this many seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::seconds)]
     pub split_time: Option<f64>,
-    /// Samples that may wait for a slow disk; what comes above that is dropped and counted
+    /// How many samples may wait for a slow disk; more are dropped and counted
     #[arg(long, value_name = "N", default_value_t = 20_000, allow_negative_numbers = true, value_parser = values::queue)]
     pub queue: usize,
     /// Wait for the robot if it is not up
@@ -92,44 +92,44 @@ pub struct RecordArgs {
 /// `lager bag play`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "It plays onto the robot that --name says, and refuses one that is up: while it plays, no robot of
-that name can be started and nothing reaches a board. Start what shall see the recording, such as
-`lager --name r2 topic echo nav/status --wait`, before or after it.
+    after_help = "It plays onto the robot that --name says, and refuses a robot that is up. While it plays, no robot
+of that name can start and nothing reaches a board. Start the programs that look, such as `lager
+--name r2 topic echo nav/status --wait`, before or after it.
 
-With --verify nothing is played. The navigator of this program is told in this process what the
-recorded one was told (nav/inputs), at the same times, and what both did is compared: every order,
-status and event byte by byte, all the rest by its proof. 0 if all is the same; 1 with the first
-command that differs, or where the recording lacks inputs. A navigator is verified from its begin, so
-record from before `lager up` (`lager bag record --wait`). Verify on the same kind of processor.
+With --verify it plays nothing. It gives the recorded inputs (nav/inputs) to the navigator of this
+program and compares the answers: every order, status and event byte by byte, all the rest by a check
+value. It exits with 0 if all is the same, and with 1 at the first command that differs or where
+inputs are missing. It needs a navigator's begin, so start `lager bag record --wait` before `lager
+up`. Verify on the same kind of processor.
 
   lager bag play --verify tour.mcap
-  lager bag play --verify tour.mcap --with tolerance=0.3    which command would be another one?"
+  lager bag play --verify tour.mcap --with tolerance=0.3    which command would change?"
 )]
 pub struct PlayArgs {
     /// The recording
     pub file: PathBuf,
-    /// Only this topic; may be given again [default: all]
+    /// Only this topic; may be given several times [default: all]
     #[arg(long, value_name = "TOPIC")]
     pub topic: Vec<String>,
-    /// So many times as fast as it was recorded
+    /// The speed; 1 is that of the recording
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = values::rate)]
     pub rate: f64,
-    /// Begin anew at the end, until Ctrl-C
+    /// Play it again and again, until Ctrl-C
     #[arg(long = "loop")]
     pub repeat: bool,
-    /// Begin so many seconds after the recording's begin
+    /// Begin this many seconds after the beginning of the recording
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = values::moment)]
     pub from: f64,
-    /// End so many seconds after the recording's begin
+    /// End this many seconds after the beginning of the recording
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::moment)]
     pub to: Option<f64>,
-    /// Which stamps samples get
+    /// The stamps that the samples get
     #[arg(long, value_enum, default_value_t)]
     pub stamps: StampsArg,
-    /// Tell the navigator again what it was told, and compare what it does with the recording
+    /// Give the recorded inputs to a navigator, and compare its answers with the recording
     #[arg(long, conflicts_with_all = ["topic", "rate", "repeat", "from", "to", "stamps"])]
     pub verify: bool,
-    /// Another value of one of the navigator's constants, in JSON; may be given again
+    /// Change one of the navigator's constants (a value in JSON); may be given several times
     #[arg(long, value_name = "NAME=VALUE", requires = "verify", value_parser = values::constant)]
     pub with: Vec<(String, String)>,
 }
@@ -137,9 +137,9 @@ pub struct PlayArgs {
 /// `--stamps`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub enum StampsArg {
-    /// The player's own, as of now
+    /// New ones, of this moment
     #[default]
     New,
-    /// Writer, number and times as recorded
+    /// The recorded ones: writer, number and times
     Recorded,
 }

@@ -15,19 +15,20 @@ use super::{ServiceArgs, values};
   lager gateway --foxglove                       live views at ws://127.0.0.1:8765
   lager up --metrics --foxglove                  both, started with the robot
 
-It only reads. Whoever reaches an address may read, too, and is not asked who he is; the live views
-also any page that a browser of that machine shows. Ask for figures by number, not by a name: a name
-could be one that somebody else has pointed here. Import services/gateway/grafana.json into Grafana,
-and services/gateway/foxglove.json as a layout into Foxglove. --foxglove needs a program that was
-built with `cargo build --release --features foxglove`.")]
+It only reads the bus. Everybody who reaches an address may read, without a password. Pages in a
+browser of that machine may read the live views as well. Ask for figures by an address in digits, not
+by a name: somebody else could have pointed a name to this machine. Import
+services/gateway/grafana.json into Grafana, and services/gateway/foxglove.json as a layout into
+Foxglove. --foxglove needs a program that was built with `cargo build --release --features foxglove`.")]
 pub struct GatewayArgs {
-    /// Where Prometheus reads figures [default: as configured, or 127.0.0.1:7430]
+    /// Where Prometheus reads figures [default: from the configuration, or 127.0.0.1:7430]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, value_parser = values::listens, help_heading = "Outside")]
     pub metrics: Option<SocketAddr>,
-    /// Where Foxglove looks on; without HOST:PORT at 127.0.0.1:8765 [default: as configured]
+    /// Where Foxglove connects; without HOST:PORT at 127.0.0.1:8765 [default: from the
+    /// configuration]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, value_parser = values::listens, help_heading = "Outside")]
     pub foxglove: Option<SocketAddr>,
-    /// What every service is told
+    /// What `up` tells every service
     #[command(flatten)]
     pub service: ServiceArgs,
 }

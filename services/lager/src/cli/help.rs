@@ -1,40 +1,23 @@
-//! The overview of the subcommands in `lager --help`, grouped by what one wants to do.
+//! The overview of the subcommands in `lager --help`, grouped by purpose.
 //!
-//! clap lists them in one row; the groups are put in its place, with the sentences that the
-//! subcommands have anyway.
+//! clap lists the subcommands in one row. This file replaces that list by groups, with the
+//! sentences of the subcommands themselves.
 
 use std::fmt::Write;
 
-use clap::CommandFactory;
+use clap::{CommandFactory, Subcommand as _};
 
-use super::Cli;
+use super::{Cli, Ordered};
 
-/// Every subcommand that people see, under the heading of its group.
+/// Every subcommand that people see, under the heading of its group; the second group also has
+/// each [`Ordered`].
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Run a robot", &["up", "simulate"]),
     (
         "Drive it and tell it what to do",
-        &[
-            "stop",
-            "resume",
-            "mode",
-            "fetch",
-            "cancel",
-            "queue",
-            "pick",
-            "picked",
-            "reset",
-            "press",
-            "place",
-            "obstacle",
-            "drive",
-            "arm",
-            "gains",
-            "calibrate",
-            "gag",
-        ],
+        &["stop", "resume", "drive", "gag"],
     ),
-    ("Look at it", &["map", "top", "topic", "bag"]),
+    ("Look at it", &["top", "topic", "bag"]),
     ("Measure", &["bench"]),
     ("Set up and mend", &["doctor", "config", "completions"]),
     (
@@ -51,6 +34,25 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ),
 ];
 
+/// The names of the subcommands of each group.
+fn groups() -> impl Iterator<Item = (&'static str, Vec<String>)> {
+    let ordered = Ordered::augment_subcommands(clap::Command::new("ordered"));
+    GROUPS
+        .iter()
+        .enumerate()
+        .map(move |(place, (heading, names))| {
+            let mut names: Vec<String> = names.iter().map(ToString::to_string).collect();
+            if place == 1 {
+                names.extend(
+                    ordered
+                        .get_subcommands()
+                        .map(|one| one.get_name().to_owned()),
+                );
+            }
+            (*heading, names)
+        })
+}
+
 /// The command line with its subcommands in groups.
 pub fn command() -> clap::Command {
     let command = Cli::command();
@@ -63,12 +65,12 @@ pub fn command() -> clap::Command {
 
 fn overview(command: &clap::Command) -> String {
     let mut text = String::new();
-    for (heading, names) in GROUPS {
+    for (heading, names) in groups() {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "\n{heading}:");
         for name in names {
             let about = command
-                .find_subcommand(name)
+                .find_subcommand(&name)
                 .and_then(clap::Command::get_about);
             let about = about.map(ToString::to_string).unwrap_or_default();
             let _ = writeln!(text, "  {name:10} {about}");
@@ -79,6 +81,8 @@ fn overview(command: &clap::Command) -> String {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
+
     use super::*;
 
     #[test]
@@ -103,12 +107,8 @@ mod tests {
     #[test]
     fn every_subcommand_stands_in_one_group_with_its_sentence() {
         let command = Cli::command();
-        let mut listed: Vec<&str> = GROUPS
-            .iter()
-            .flat_map(|(_, names)| *names)
-            .copied()
-            .collect();
-        let mut existing: Vec<&str> = command
+        let mut listed: Vec<String> = groups().flat_map(|(_, names)| names).collect();
+        let mut existing: Vec<_> = command
             .get_subcommands()
             .filter(|subcommand| !subcommand.is_hide_set())
             .map(clap::Command::get_name)
@@ -122,5 +122,55 @@ mod tests {
         {
             assert!(line.len() > 20, "no sentence: {line}");
         }
+    }
+
+    #[test]
+    fn no_help_names_a_requirement() {
+        let mut left = vec![Cli::command()];
+        let mut seen = 0;
+        while let Some(mut command) = left.pop() {
+            let help = command.render_long_help().to_string();
+            for bracketed in help.split('(').skip(1) {
+                let (id, _) = bracketed.split_once([')', ',']).unwrap_or((bracketed, ""));
+                let digits =
+                    id.trim_start_matches(|sign: char| sign.is_ascii_uppercase() || sign == '-');
+                let named = id.len() > digits.len() && digits.parse::<u8>().is_ok();
+                assert!(
+                    !named,
+                    "({id}): tests/REQUIREMENTS.md is no reading of people: {help}"
+                );
+            }
+            seen += 1;
+            left.extend(command.get_subcommands().cloned());
+        }
+        assert!(seen > 30, "{seen}");
+    }
+
+    /// Each line that begins with `lager` in what people read first is one that the program takes.
+    #[test]
+    fn the_commands_of_the_readmes_are_understood() {
+        let documents = [
+            include_str!("../../../../README.md"),
+            include_str!("../../../../bus/README.md"),
+            include_str!("../../../../firmware/README.md"),
+            include_str!("../../../gateway/README.md"),
+            include_str!("../../README.md"),
+            include_str!("../../../recorder/README.md"),
+            include_str!("../../../station/README.md"),
+        ];
+        let mut read = 0;
+        for line in documents.iter().flat_map(|text| text.lines()) {
+            let (line, _comment) = line.split_once(" #").unwrap_or((line, ""));
+            let Some(words) = line.strip_prefix("lager ") else {
+                continue;
+            };
+            // The one value in quotation marks has a blank.
+            let words = words.replace("\": ", "\":").replace('\'', "");
+            let words = words.split_whitespace().filter(|word| *word != "&");
+            let cli = Cli::try_parse_from(std::iter::once("lager").chain(words));
+            assert!(cli.is_ok(), "{line}: {}", cli.expect_err("as it says"));
+            read += 1;
+        }
+        assert!(read > 40, "{read}");
     }
 }

@@ -1,29 +1,28 @@
-//! The flags that ask for real time, of `up` and of each service, and how they go over the
-//! configuration.
+//! The flags for real time, of `up` and of each service. They go over the configuration.
 
 use std::str::FromStr;
 
 use clap::Args;
+use lager_supervisor::Parent;
 use lager_topics::Role;
 
 use crate::config::RealtimeSection;
 use crate::realtime::{CoreSet, CoreSetError, HIGHEST_PRIORITY, Wanted};
-use crate::supervisor::Parent;
 
-/// What every process on the path may want of the machine.
+/// What a process on the path may ask of the machine.
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Real time")]
 pub struct RealtimeArgs {
-    /// Run under SCHED_FIFO at this priority, 1..99; 0 is the normal scheduler
+    /// Run at this priority of SCHED_FIFO, 1..99; 0 is the normal scheduler
     #[arg(long, value_name = "PRIORITY", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(0..=i64::from(HIGHEST_PRIORITY)))]
     pub realtime: Option<u8>,
-    /// Keep all memory from being paged out
+    /// Keep all memory of the process in RAM, never in swap
     #[arg(long)]
     pub lock_memory: bool,
 }
 
 impl RealtimeArgs {
-    /// Puts the flags over what was configured.
+    /// Lets the flags replace values of the configuration.
     fn apply(&self, priority: &mut u8, lock_memory: &mut bool) {
         *priority = self.realtime.unwrap_or(*priority);
         *lock_memory |= self.lock_memory;
@@ -43,7 +42,8 @@ pub struct UpRealtimeArgs {
 }
 
 impl UpRealtimeArgs {
-    /// Puts the flags over the configuration's section; the last choice of a service counts.
+    /// Lets the flags replace values of the configuration's section. The last choice for a service
+    /// counts.
     pub fn apply(&self, section: &mut RealtimeSection) {
         self.common
             .apply(&mut section.priority, &mut section.lock_memory);
@@ -77,7 +77,7 @@ impl FromStr for CoreChoice {
             Some(("simulator", cores)) => (Some(Role::Simulator), cores),
             Some((other, _)) => {
                 return Err(format!(
-                    "`{other}` is no service that cores can be chosen for; those are bridge, logic and simulator"
+                    "`{other}` is not a service that can have cores of its own; bridge, logic and simulator can"
                 ));
             }
         };
@@ -88,13 +88,13 @@ impl FromStr for CoreChoice {
     }
 }
 
-/// What a service is told beyond the configuration.
+/// What `up` tells a service besides the configuration.
 #[derive(Debug, Args)]
 pub struct ServiceArgs {
-    /// Take up the state that the supervisor kept of the process before this one
+    /// Resume from the state that the supervisor kept of the previous process
     #[arg(long)]
     pub resume: bool,
-    /// End when the supervisor ends; its process, and when it began in ns of the monotonic clock
+    /// End when the supervisor ends: its process, and its start in ns of the monotonic clock
     #[arg(long, value_name = "PID@NS")]
     pub parent: Option<Parent>,
     /// Priority and memory
@@ -106,7 +106,7 @@ pub struct ServiceArgs {
 }
 
 impl ServiceArgs {
-    /// Puts the flags over what the configuration says of this service.
+    /// Lets the flags replace the configuration's values for this service.
     pub fn apply(&self, wanted: &mut Wanted) {
         self.realtime
             .apply(&mut wanted.priority, &mut wanted.lock_memory);

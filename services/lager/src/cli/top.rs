@@ -14,9 +14,9 @@ use super::values;
   lager top --once --json             for a program
   lager top --bag tour.mcap           the same table over a recording
 
-A topic that has lost samples in the last 30 seconds stands first, in red and with a !.
-Only topics that are shown are read; of a closed one the bus is asked who writes and reads it.
-It is an observer of each, and does not slow the robot.")]
+A topic that has lost samples in the last 30 seconds stands first, in red and with a `!`. The tool
+reads only the topics that it shows. Of a closed topic it shows writers and readers. It is an
+observer and does not slow the robot.")]
 pub struct TopArgs {
     /// Only topics whose names contain this
     #[arg(long, value_name = "TEXT", default_value = "")]
@@ -24,7 +24,7 @@ pub struct TopArgs {
     /// Print one picture and end
     #[arg(long)]
     pub once: bool,
-    /// How long that picture is measured [default: 2]
+    /// How many seconds to measure for that picture [default: 2]
     #[arg(long, value_name = "SECONDS", requires = "once", allow_negative_numbers = true, value_parser = values::seconds)]
     pub duration: Option<f64>,
     /// Print that picture as one line of JSON

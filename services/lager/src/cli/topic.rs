@@ -26,12 +26,12 @@ pub struct TopicArgs {
     /// What to do
     #[command(subcommand)]
     pub command: TopicCommand,
-    /// Print JSON, one value a line
+    /// Print JSON, one value in each line
     #[arg(long, global = true, help_heading = "Output")]
     pub json: bool,
 }
 
-/// Which topic is watched, and for how long.
+/// Which topic to watch, and for how long.
 #[derive(Debug, Args)]
 pub struct WatchArgs {
     /// The topic's name, such as sensor/line
@@ -57,7 +57,7 @@ pub struct LimitArgs {
 }
 
 impl LimitArgs {
-    /// As the tools take it.
+    /// The limits in the form of the tools.
     pub fn limits(&self) -> Limits {
         Limits {
             duration: self.duration.map(Duration::from_secs_f64),
@@ -69,17 +69,17 @@ impl LimitArgs {
 /// The topic tools.
 #[derive(Debug, Subcommand)]
 pub enum TopicCommand {
-    /// Every topic on the bus: of every robot, or with --name of that one
+    /// List the topics on the bus, of every robot; with --name, of one robot
     List,
-    /// One topic: what it carries, its limits, who writes and reads it
+    /// Describe one topic: its fields, its limits, its writers and readers
     Info {
         /// The topic's name, such as sensor/line
         #[arg(value_parser = values::TopicName, hide_possible_values = true)]
         topic: String,
     },
-    /// Write the table of topics for programs in another language
+    /// Write the table of topics for programs in other languages
     Schema {
-        /// Write layouts.py and its stub into this folder, as bus/python has them
+        /// Write layouts.py and its stub into this folder; bus/python has the same files
         #[arg(long, value_name = "FOLDER", required = true)]
         python: PathBuf,
     },
@@ -88,7 +88,8 @@ pub enum TopicCommand {
         /// What and how long
         #[command(flatten)]
         watch: WatchArgs,
-        /// Print only this field, such as sensor.bad_crc or orders.0.product; may be given again
+        /// Print only this field, such as sensor.bad_crc or orders.0.product; may be given several
+        /// times
         #[arg(long, value_name = "PATH")]
         field: Vec<String>,
     },
@@ -98,7 +99,7 @@ pub enum TopicCommand {
         #[command(flatten)]
         watch: WatchArgs,
     },
-    /// Measure bytes a second, once a second
+    /// Measure bytes per second, once a second
     Bw {
         /// What and how long
         #[command(flatten)]
@@ -106,8 +107,8 @@ pub enum TopicCommand {
     },
     /// Measure how long samples take from their source to a reader, once a second
     #[command(
-        after_help = "This tool is woken by nobody and looks every millisecond. How long samples waited for that look
-is shown as `own wait` and is not part of `publish -> receive`."
+        after_help = "Nobody wakes this tool; it looks every millisecond. `own wait` is the time for which samples
+waited for that look; it is not part of `publish -> receive`."
     )]
     Delay {
         /// What and how long
@@ -121,25 +122,26 @@ is shown as `own wait` and is not part of `publish -> receive`."
   jq -c .payload samples.json | lager topic pub weather/now    one for each value that is read
   lager topic pub mission/order '{\"id\": 7, \"product\": 2}' --live
 
-Fields that are not named have their blank value; a field that there is not is refused. Enums
-are names or codes. A topic of your own has to be open somewhere, by whoever reads it.
+Fields that you do not name have their blank value. The tool refuses a field that does not exist.
+Enums are names or codes. Some program must have a topic of your own open, for example a reader.
 
-What may move a robot is not published while one of that name is up, and none can start
-meanwhile. With --live it is published beside the robot, if the table lets several write the
-topic (`lager topic info` shows whom it wakes); what one service alone writes never is.")]
+While a robot is up, the tool does not publish what may move it; while the tool publishes, no robot
+of that name can start. With --live it publishes beside the robot, if several programs may write
+the topic (`lager topic info` shows whom it wakes). It never publishes what one service alone writes.")]
     Pub {
         /// The topic's name, such as weather/now
         #[arg(value_parser = values::TopicName, hide_possible_values = true)]
         topic: String,
-        /// The payload [default: one for each JSON value on standard input]
+        /// The payload [default: one payload for each JSON value on standard input]
         payload: Option<String>,
-        /// So many samples a second [default: one sample, or each as it is read]
+        /// How many samples per second [default: one sample, or each as it is read]
         #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = values::hz)]
         rate: Option<f64>,
         /// When it ends
         #[command(flatten)]
         until: LimitArgs,
-        /// Publish beside a robot that is up, which may move by it, or beside another writer
+        /// Publish although a robot is up, which may move by this, or although another program
+        /// writes the topic
         #[arg(long)]
         live: bool,
     },

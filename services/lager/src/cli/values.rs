@@ -1,19 +1,20 @@
-//! What arguments of the command line mean, where clap does not know it by itself: each reader
-//! returns the value, or the sentence that refuses it.
+//! Reads arguments of the command line that clap does not know by itself. Each reader returns the
+//! value, or a sentence that says why it refuses the text.
 //!
-//! Whatever makes no sense is refused here, before a bus is opened, so that clap ends with its
-//! exit code for wrong usage and names the argument. Numbers may be negative, so that `-1` is
-//! refused for what it is and not as an unknown flag.
+//! A value that makes no sense is refused here, before a bus is opened. So clap names the argument
+//! and ends with its exit code for wrong usage. Numbers may be negative, so that clap does not
+//! refuse `-1` as an unknown flag.
 
 use std::ffi::OsStr;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use clap::builder::{PossibleValue, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Command};
+use lager_home::UnitName;
 use lager_lines::{Called, Name};
-use lager_ports::RobotName;
+use lager_orders::{Mode, Pick};
 use lager_topics::TOPICS;
 use lager_wire::{OperatorCommand, parse_code};
 
@@ -25,12 +26,12 @@ use crate::meant::{meant, unknown_topic};
 const LONGEST_DRIVE_S: f64 = 86_400.0;
 /// The longest virtual time of `lager simulate`, in seconds: a year.
 const LONGEST_RUN_S: u64 = 365 * 86_400;
-/// How many samples a second are published.
+/// The allowed rates of publishing, in samples a second.
 const HZ: RangeInclusive<f64> = 0.001..=10_000.0;
-/// How many times as fast as it was recorded a recording is played.
+/// The allowed speeds of a player.
 const RATES: RangeInclusive<f64> = 0.01..=100.0;
 
-/// What a robot is to fetch.
+/// Products for a robot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fetch {
     /// Which robot.
@@ -39,7 +40,7 @@ pub struct Fetch {
     pub products: Vec<Called>,
 }
 
-/// A robot and the products that it is to fetch.
+/// A robot and the products that it has to fetch.
 pub fn fetch(text: &str) -> Result<Fetch, String> {
     let usage = || format!("`{text}` is no order; write a robot and its products, as in r1=3,1");
     let (robot, products) = text.split_once('=').ok_or_else(usage)?;
@@ -51,7 +52,7 @@ pub fn fetch(text: &str) -> Result<Fetch, String> {
     })
 }
 
-/// A command of the wheels, by its name or its code.
+/// A command for the wheels, by its name or its code.
 pub fn wheel_command(text: &str) -> Result<OperatorCommand, String> {
     let command = command(text, OperatorCommand::wheel)?;
     if matches!(command, OperatorCommand::Arm(_)) {
@@ -63,7 +64,7 @@ pub fn wheel_command(text: &str) -> Result<OperatorCommand, String> {
     Ok(command)
 }
 
-/// A command of the arm, by its name or its code.
+/// A command for the arm, by its name or its code.
 pub fn arm_command(text: &str) -> Result<OperatorCommand, String> {
     let command = command(text, OperatorCommand::arm)?;
     if !matches!(command, OperatorCommand::Arm(_)) {
@@ -75,7 +76,25 @@ pub fn arm_command(text: &str) -> Result<OperatorCommand, String> {
     Ok(command)
 }
 
-/// A command by its name, as `by_name` knows them, or in one of the three forms of its code.
+/// Who steers, by its word.
+pub fn mode() -> impl TypedValueParser<Value = Mode> {
+    PossibleValuesParser::new([
+        PossibleValue::new("manual").help("The operator steers"),
+        PossibleValue::new("autonomous").help("Logic steers"),
+    ])
+    .try_map(|word| Mode::from_word(&word).ok_or("no mode"))
+}
+
+/// Who picks the goods up, by its word.
+pub fn pick() -> impl TypedValueParser<Value = Pick> {
+    PossibleValuesParser::new([
+        PossibleValue::new("manual").help("A person moves the arm and says when it is done"),
+        PossibleValue::new("auto").help("The robot, by itself"),
+    ])
+    .try_map(|word| Pick::from_word(&word).ok_or("nobody"))
+}
+
+/// A command by its name (`by_name` knows the names), or by its code in one of three forms.
 fn command(
     text: &str,
     by_name: fn(&str) -> Option<OperatorCommand>,
@@ -95,15 +114,15 @@ fn command(
     })
 }
 
-/// How many samples a second are published.
+/// A rate of publishing, in samples a second.
 pub fn hz(text: &str) -> Result<f64, String> {
     let (least, most) = (HZ.start(), HZ.end());
     let rule = format!("give {least} to {most} samples a second");
     number(text, |rate| HZ.contains(&rate), &rule)
 }
 
-/// A topic of the table, or one whose first part stands in no name there: such topics are other
-/// people's.
+/// A topic of the table, or a topic of another program: its first part is then not a first part in
+/// the table.
 fn topic(text: &str) -> Result<String, String> {
     let family = |name: &str| name.split_once('/').map(|(family, _)| family.to_owned());
     let asked = family(text);
@@ -115,7 +134,7 @@ fn topic(text: &str) -> Result<String, String> {
     }
 }
 
-/// The name of a topic; a shell completes those of the table.
+/// The name of a topic. A shell completes the names of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct TopicName;
 
@@ -139,7 +158,7 @@ impl TypedValueParser for TopicName {
 
 /// The name of a robot.
 pub fn robot(text: &str) -> Result<String, String> {
-    let name: RobotName = text.parse().map_err(said)?;
+    let name: UnitName = text.parse().map_err(said)?;
     Ok(name.as_str().to_owned())
 }
 
@@ -165,11 +184,6 @@ pub fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
 /// How many, at least one.
 pub fn count(text: &str) -> Result<u64, String> {
     whole(text, 1..=u64::MAX, "one is the least")
-}
-
-/// How many runs, at least one.
-pub fn runs(text: &str) -> Result<usize, String> {
-    whole(text, 1..=usize::MAX, "one run is the least")
 }
 
 /// A seed of the noise.
@@ -201,7 +215,7 @@ pub fn limit(text: &str) -> Result<u64, String> {
     )
 }
 
-/// A rate that boards are built for.
+/// A baud rate that the boards can have.
 pub fn baud(text: &str) -> Result<u32, String> {
     let [usual, slow] = BAUD_RATES;
     let known = || format!("`{text}` is no rate of the boards; those are {usual} and {slow}");
@@ -213,7 +227,7 @@ pub fn baud(text: &str) -> Result<u32, String> {
     }
 }
 
-/// How many times as fast as real time.
+/// The speed of the robot's clock; 1 is real time.
 pub fn speed(text: &str) -> Result<f64, String> {
     let rule = format!(
         "the clock runs from {} to {} times as fast as real time (`lager simulate` runs faster)",
@@ -244,7 +258,7 @@ pub fn queue(text: &str) -> Result<usize, String> {
     )
 }
 
-/// How many times as fast as it was recorded.
+/// The speed of a player; 1 is that of the recording.
 pub fn rate(text: &str) -> Result<f64, String> {
     let rule = format!(
         "a recording is played from {} to {} times as fast as it was recorded",
@@ -254,14 +268,14 @@ pub fn rate(text: &str) -> Result<f64, String> {
     number(text, |rate| RATES.contains(&rate), &rule)
 }
 
-/// A moment of a recording, in seconds from its begin.
+/// A moment of a recording, in seconds from its beginning.
 pub fn moment(text: &str) -> Result<f64, String> {
-    let rule = "give the seconds from the recording's begin, 0 or more";
+    let rule = "give the seconds from the recording's beginning, 0 or more";
     let fits = |seconds| (0.0..=LONGEST_RUN_S as f64).contains(&seconds);
     number(text, fits, rule)
 }
 
-/// A constant of the navigator with its value.
+/// A constant of the navigator, and its value.
 pub fn constant(text: &str) -> Result<(String, String), String> {
     let (name, value) = text
         .split_once('=')
@@ -269,7 +283,7 @@ pub fn constant(text: &str) -> Result<(String, String), String> {
     Ok((name.to_owned(), value.to_owned()))
 }
 
-/// A whole number within `range`, or `rule`.
+/// A whole number within `range`; else an error with `rule`.
 fn whole<T: FromStr + PartialOrd>(
     text: &str,
     range: RangeInclusive<T>,
@@ -284,16 +298,16 @@ fn whole<T: FromStr + PartialOrd>(
     let is_whole = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
     Err(match is_whole {
         true => format!("{text} does not fit: {rule}"),
-        false => format!("`{text}` is no whole number: {rule}"),
+        false => format!("`{text}` is not a whole number: {rule}"),
     })
 }
 
-/// A number that `fits`, or `rule`.
+/// A number that `fits`; else an error with `rule`.
 fn number(text: &str, fits: impl Fn(f64) -> bool, rule: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(number) if fits(number) => Ok(number),
         Ok(_) => Err(format!("{text} does not fit: {rule}")),
-        Err(_) => Err(format!("`{text}` is no number: {rule}")),
+        Err(_) => Err(format!("`{text}` is not a number: {rule}")),
     }
 }
 
@@ -370,7 +384,7 @@ mod tests {
             (&["drive", "forward", "--seconds", "nan"], "more than 0"),
             (
                 &["drive", "forward", "--seconds", "abc"],
-                "`abc` is no number: give a time",
+                "`abc` is not a number: give a time",
             ),
             (&["drive", "forwrad"], "did you mean `forward`?"),
             (&["arm", "sqeeze"], "did you mean `squeeze`?"),
@@ -382,8 +396,8 @@ mod tests {
                 &["gains", "300", "2"],
                 "300 does not fit: a gain is from 0 to 255",
             ),
-            (&["gains", "two", "2"], "`two` is no whole number: a gain"),
-            (&["gains", "1", "2.5"], "`2.5` is no whole number: a gain"),
+            (&["gains", "two", "2"], "`two` is not a whole number"),
+            (&["gains", "1", "2.5"], "`2.5` is not a whole number"),
             (&["cancel", "last"], "`lager queue` shows"),
             (&["queue", "up", "-1"], "`lager queue` shows"),
             (&["simulate", "--battery", "101"], "0 to 100 percent"),
@@ -397,21 +411,20 @@ mod tests {
             (&["topic", "hz", "nav/statsu"], "did you mean `nav/status`?"),
             (
                 &["topic", "pub", "weather/now", "--rate", "fast"],
-                "`fast` is no number",
+                "`fast` is not a number",
             ),
             (
                 &["up", "--speed", "fast"],
-                "`fast` is no number: the clock runs",
+                "`fast` is not a number: the clock runs",
             ),
             (
                 &["bag", "play", "x.mcap", "--rate", "fast"],
-                "`fast` is no number",
+                "`fast` is not a number",
             ),
             (
                 &["bag", "play", "x.mcap", "--from", "begin"],
-                "`begin` is no number",
+                "`begin` is not a number",
             ),
-            (&["bench", "hop", "--runs", "-2"], "one run"),
             (&["--name", "R 1", "stop"], "only a-z"),
             (&["bag", "record", "--topic", "sensor/lime"], "sensor/line"),
             (&["bag", "record", "--split-size", "0"], "from 1 MiB"),

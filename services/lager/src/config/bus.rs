@@ -4,28 +4,39 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
-use lager_ports::Policy;
+use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
-/// A service waits at most this long before it looks at its clock, so a longer spin never comes
-/// to its end.
+use super::section::section;
+
+/// A service waits at most this long before it looks at its clock, so a longer spin would never
+/// end.
 const LONGEST_SPIN_US: u64 = 20_000;
 
-/// `[bus]`: where it lives, and how it is waited for.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BusSection {
-    /// Its folder; unset, it is the system's or the user's own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub folder: Option<PathBuf>,
-    /// How bridge and logic wait for samples.
-    pub waiting: Waiting,
-    /// The longest that `waiting = "adaptive"` looks without pause for one sample, in µs.
-    pub longest_spin_us: u64,
+section! {
+    "bus"
+    /// Where the bus lives, and how its services wait.
+    pub struct BusSection {
+        /// The folder of the bus, at most 37 bytes. Unset, /run/lager if this user owns it, else
+        /// /dev/shm/lager-UID. Robots in different folders never meet.
+        pub folder: Option<PathBuf> = None,
+        /// How bridge and logic wait for samples: "block" (sleep), "spin" (a core for each) or
+        /// "adaptive" (look without pause while samples come fast, sleep when they do not) ...
+        pub waiting: Waiting = Waiting::Block,
+        /// ... and the longest that "adaptive" looks without pause for one sample, in microseconds.
+        pub longest_spin_us: u64 = usual_spin_us(),
+    }
+}
+
+fn usual_spin_us() -> u64 {
+    match Policy::ADAPTIVE {
+        Policy::Adaptive { longest_spin } => longest_spin.as_micros() as u64,
+        Policy::Block | Policy::Spin => 0,
+    }
 }
 
 impl BusSection {
-    /// Refuses a time that no service could wait for.
+    /// Refuses a time that is too long for any service.
     pub fn validate(&self) -> Result<()> {
         if self.longest_spin_us > LONGEST_SPIN_US {
             bail!(
@@ -36,7 +47,7 @@ impl BusSection {
         Ok(())
     }
 
-    /// How bridge and logic wait, as their ports want it.
+    /// How bridge and logic wait, in the form of their ports.
     pub fn policy(&self) -> Policy {
         match self.waiting {
             Waiting::Block => Policy::Block,
@@ -48,29 +59,14 @@ impl BusSection {
     }
 }
 
-/// How a service waits: `lager_ports::Policy` as a word of the configuration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How a service waits: `lager_wake::Policy` as a word of the configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Waiting {
     /// Sleep until something comes.
-    #[default]
     Block,
     /// Look without pause; costs a core for each service.
     Spin,
     /// Look without pause while samples come fast, sleep when they do not.
     Adaptive,
-}
-
-impl Default for BusSection {
-    fn default() -> Self {
-        let longest_spin = match Policy::ADAPTIVE {
-            Policy::Adaptive { longest_spin } => longest_spin,
-            Policy::Block | Policy::Spin => Duration::ZERO,
-        };
-        Self {
-            folder: None,
-            waiting: Waiting::default(),
-            longest_spin_us: longest_spin.as_micros() as u64,
-        }
-    }
 }

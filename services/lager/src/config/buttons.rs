@@ -5,41 +5,31 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use lager_bridge::buttons::ButtonsConfig;
-use serde::{Deserialize, Serialize};
 
-/// The longest time for which a contact may have to be steady, in ms.
+use super::section::section;
+
+/// The longest `debounce_ms`.
 const LONGEST_DEBOUNCE_MS: u64 = 500;
 
-/// `[buttons]`: the robot's own reset button and mode switch, as GPIO lines.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ButtonsSection {
-    /// The chip; unset, there are no buttons.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub chip: Option<PathBuf>,
-    /// The line of the reset button.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reset: Option<u32>,
-    /// The line of the mode switch.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub switch: Option<u32>,
-    /// For how long a contact must be steady, in ms.
-    pub debounce_ms: u64,
-}
-
-impl Default for ButtonsSection {
-    fn default() -> Self {
-        Self {
-            chip: None,
-            reset: None,
-            switch: None,
-            debounce_ms: 20,
-        }
+section! {
+    "buttons"
+    /// The robot's own reset button and mode switch.
+    pub struct ButtonsSection {
+        /// The GPIO chip of the lines, such as /dev/gpiochip0. A closed contact pulls a line to
+        /// ground. Unset, there are no buttons.
+        pub chip: Option<PathBuf> = None,
+        /// The line of the reset button, by its offset. It says that the robot stands on the
+        /// delivery node.
+        pub reset: Option<u32> = None,
+        /// The line of the mode switch: open is manual, closed is autonomous.
+        pub switch: Option<u32> = None,
+        /// For how many ms a contact must be steady, at most 500.
+        pub debounce_ms: u64 = 20,
     }
 }
 
 impl ButtonsSection {
-    /// The lines for the bridge, where there are any.
+    /// The lines for the bridge, if there are any.
     pub fn lines(&self) -> Option<ButtonsConfig> {
         Some(ButtonsConfig {
             chip: self.chip.clone()?,
@@ -49,7 +39,7 @@ impl ButtonsSection {
         })
     }
 
-    /// Refuses what cannot be.
+    /// Refuses lines that cannot work.
     ///
     /// # Errors
     /// The sentence names the key.

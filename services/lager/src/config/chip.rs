@@ -1,36 +1,34 @@
-//! `[chip]`: the boards' real images in their emulator, and where these are found.
+//! `[chip]`: finds the boards' real images and their emulator.
 //!
-//! The emulator is a separate program, because it contains GPL-3 code; nothing of this program is
-//! linked with it. The emulator and the images are looked for beside this program, as in an
+//! The emulator is a separate program, because it contains GPL-3 code; this program does not link
+//! it. This module looks for the emulator and the images beside this program, as in an
 //! installation, and in the source tree of this program or of the current folder.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use super::section::section;
 
-/// `[chip]`: unset files are looked for.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ChipSection {
-    /// The emulator's program.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub emulator: Option<PathBuf>,
-    /// The sensor board's image.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sensor_elf: Option<PathBuf>,
-    /// The steering board's image.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub steering_elf: Option<PathBuf>,
-    /// The folder that keeps both boards' EEPROM.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub eeprom: Option<PathBuf>,
-    /// The page in which the emulator publishes the robot's time.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub clock: Option<PathBuf>,
+section! {
+    "chip"
+    /// The emulator's program and the boards' images, built for [serial] baud. Unset, `lager` looks
+    /// for them beside itself and in the source tree.
+    pub struct ChipSection {
+        /// The emulator's program ...
+        pub emulator: Option<PathBuf> = None,
+        /// ... and the images that the boards run.
+        pub sensor_elf: Option<PathBuf> = None,
+        pub steering_elf: Option<PathBuf> = None,
+        /// Folder that keeps the EEPROM of both boards, which has their settings. Unset, it is in
+        /// the folder of the bus: the settings outlive the robot, but not a restart of the machine.
+        pub eeprom: Option<PathBuf> = None,
+        /// The file in which an emulator that somebody else runs at the ports of [serial] publishes
+        /// the robot's time. With body = "chip", `up` chooses it.
+        pub clock: Option<PathBuf> = None,
+    }
 }
 
-/// The files that an emulated robot cannot do without.
+/// The files that an emulated robot needs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Parts {
     /// The emulator's program.
@@ -41,7 +39,7 @@ pub struct Parts {
     pub steering_elf: PathBuf,
 }
 
-/// What is not there, one sentence for each.
+/// One sentence for each missing file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MissingParts(Vec<String>);
 
@@ -49,7 +47,7 @@ impl fmt::Display for MissingParts {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             formatter,
-            "the emulated boards lack something: {}",
+            "files for the emulated boards are missing: {}",
             self.0.join("; ")
         )
     }
@@ -57,8 +55,8 @@ impl fmt::Display for MissingParts {
 
 impl std::error::Error for MissingParts {}
 
-/// One of the files: its key, its name, the folder of the source tree that it is built in, and the
-/// command for that.
+/// One of the files: its key, its name, the folder of the source tree in which it is built, and the
+/// command that builds it.
 struct Part {
     key: &'static str,
     name: &'static str,
@@ -87,7 +85,7 @@ const STEERING: Part = Part {
 const IMAGES: &str = "firmware/avr/target/images";
 const BUILD_IMAGES: &str = "build both images with `firmware/avr/build`, which says what it needs";
 
-/// The images for the original's baud rate, for which they are built in a folder of their own.
+/// The images for the original's baud rate. They have a folder of their own.
 const SLOW: u32 = 9_600;
 const SLOW_SENSOR: Part = Part {
     built: SLOW_IMAGES,
@@ -104,10 +102,10 @@ const BUILD_SLOW_IMAGES: &str =
     "build both images with `firmware/avr/build --baud 9600`, which says what it needs";
 
 impl ChipSection {
-    /// The files this machine has, with their whole paths; the images are those for `baud`.
+    /// The files of this machine with their full paths; the images are those for `baud`.
     ///
     /// # Errors
-    /// What is missing and how to get it.
+    /// A file is missing. The sentence says how to get it.
     pub fn parts(&self, baud: u32) -> Result<Parts, MissingParts> {
         let program = std::env::current_exe().unwrap_or_default();
         let current = std::env::current_dir().unwrap_or_default();

@@ -1,28 +1,26 @@
-//! `[gateway]`: what programs outside are shown of the robot.
+//! `[gateway]`: where programs outside the robot may look at it.
 
 use std::net::SocketAddr;
 
 use lager_gateway::Addresses;
-use serde::{Deserialize, Serialize};
 
+use super::section::section;
 use crate::address::in_config;
 
-/// `[gateway]`: what programs outside are shown of the robot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct GatewaySection {
-    /// Where Prometheus reads figures; unset, nowhere.
-    #[serde(
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "in_config"
-    )]
-    pub metrics: Option<SocketAddr>,
-    /// Where Foxglove looks on; unset, nowhere.
-    #[serde(
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "in_config"
-    )]
-    pub foxglove: Option<SocketAddr>,
+section! {
+    "gateway"
+    /// What the robot shows to programs outside.
+    pub struct GatewaySection {
+        /// Where Prometheus reads the robot's figures, such as 127.0.0.1:7430. Everybody who can
+        /// reach that address may read them. Unset, nowhere.
+        #[serde(deserialize_with = "in_config")]
+        pub metrics: Option<SocketAddr> = None,
+        /// Where Foxglove connects, such as 127.0.0.1:8765. Everybody who can reach that address
+        /// may look, and so may every page in a browser of that machine. The program must be built
+        /// with the feature foxglove.
+        #[serde(deserialize_with = "in_config")]
+        pub foxglove: Option<SocketAddr> = None,
+    }
 }
 
 impl GatewaySection {
@@ -31,7 +29,7 @@ impl GatewaySection {
         self.addresses() != Addresses::default()
     }
 
-    /// The same for the gateway.
+    /// The section in the form of the gateway.
     pub fn addresses(&self) -> Addresses {
         Addresses {
             metrics: self.metrics,

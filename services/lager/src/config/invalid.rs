@@ -1,11 +1,11 @@
-//! Why a configuration cannot be read: where, what is wrong there in plain words, and what the key
-//! means, as `lager config` explains it.
+//! Explains why a configuration cannot be read: the line, the fault in plain words, and the meaning
+//! of the key in the words of `lager config`.
 
 use lager_lines::meant;
 
-use super::Config;
+use super::documented::meaning;
 
-/// What the reader of TOML calls things, and what people call them.
+/// Words of the TOML reader, and plain words for them.
 const PLAIN: [(&str, &str); 12] = [
     ("expected f64", "expected a number"),
     ("expected f32", "expected a number"),
@@ -53,29 +53,9 @@ fn section(line: &str) -> Option<&str> {
     line.trim().strip_prefix('[')?.split(']').next()
 }
 
-/// What the documented configuration says of a key.
-fn meaning(wanted_section: &str, wanted_key: &str) -> Option<String> {
-    let documented = Config::default().documented();
-    let mut found = "";
-    let mut comment: Vec<&str> = Vec::new();
-    for line in documented.lines() {
-        if let Some(name) = section(line) {
-            found = name;
-        }
-        let key = line.trim_start_matches("# ").split(" = ").next();
-        if found == wanted_section && line.contains(" = ") && key == Some(wanted_key) {
-            return (!comment.is_empty()).then(|| comment.join(" "));
-        }
-        match line.strip_prefix("# ") {
-            Some(text) => comment.push(text),
-            None => comment.clear(),
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::Config;
     use super::*;
 
     fn said(text: &str) -> String {
@@ -91,7 +71,7 @@ mod tests {
                 &[
                     "line 1, speed = \"fast\"",
                     "expected a number",
-                    "real time the robot's clock",
+                    "speed of the robot's clock",
                 ][..],
             ),
             (

@@ -1,58 +1,67 @@
-//! `[logic]`: what the navigator has to be told of the robot that it drives.
+//! `[logic]`: the measures of the robot that the navigator drives.
 
 use std::ops::RangeInclusive;
 
 use anyhow::{Result, bail};
 use lager_logic::LogicConfig;
+use lager_orders::Pick;
 use lager_wire::SERVO_MAX;
-use serde::{Deserialize, Serialize};
 
-/// Robots that dead reckoning can follow, in mm/s: slower ones are overtaken by its time-outs,
-/// faster ones pass a mark between two frames.
+use super::section::section;
+
+/// The speeds that dead reckoning can follow, in mm/s. The time-outs are too short for a slower
+/// robot, and a faster one passes a mark between two frames.
 const CRUISES_MM_PER_S: RangeInclusive<f32> = 10.0..=1_000.0;
 
-/// Where line sensors can be, in mm ahead of the axle: nearer than the tape's width the axle is on
-/// a node as soon as they see it, and farther than the smallest square's side they are past the
-/// next one.
+/// Where line sensors can be, in mm ahead of the axle. If they were nearer than the tape's width,
+/// the axle would be on a node as soon as they see it. If they were farther than the smallest
+/// square's side, they would be past the next node.
 const SENSORS_AHEAD_MM: RangeInclusive<f32> = 20.0..=400.0;
 /// The same for turns on the spot, in degrees per second.
 const TURNS_DEG_PER_S: RangeInclusive<f32> = 5.0..=180.0;
-/// The same for the tape's width: wider, a crossing is no mark any more.
+/// The same for the tape's width: on wider tape a crossing is not a mark any more.
 const TAPES_MM: RangeInclusive<f32> = 5.0..=50.0;
 /// The same for the ranger's place.
 const RANGERS_AHEAD_MM: RangeInclusive<f32> = 0.0..=400.0;
-/// `[logic]`: the measures dead reckoning needs.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LogicSection {
-    /// Speed in mm/s when both motors run at the standard duty of 100.
-    pub cruise_mm_per_s: f32,
-    /// How far the line sensors are ahead of the wheels' axle, in mm.
-    pub sensor_ahead_mm: f32,
-    /// Degrees per second of a turn on the spot at that duty.
-    pub turn_deg_per_s: f32,
-    /// Width of the tape, in mm.
-    pub tape_mm: f32,
-    /// How far the ranger is ahead of the wheels' axle, in mm.
-    pub ranger_ahead_mm: f32,
-    /// Battery, in tenths of a volt, below which the robot stands at the next crossing; 0 = none.
-    pub low_battery_decivolts: u8,
-    /// How far the ranger sees, in cm; 0 = there is none, and no way is looked at.
-    pub ranger_cm: u8,
-    /// After how many seconds ways that were found blocked are tried again.
-    pub try_again_s: u32,
-    /// The shoulder's servo when the claw is around goods in front of the robot, in units of 0.29
-    /// degrees.
-    pub reach_shoulder: u16,
-    /// The elbow's servo for that.
-    pub reach_elbow: u16,
-    /// Who picks the goods up; none = as usual with the body ([`Config::pick`]).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pick: Option<PickBy>,
+
+section! {
+    "logic"
+    /// The measures of the robot that the navigator drives.
+    pub struct LogicSection {
+        /// Speed in mm/s when both motors run at the standard duty of 100.
+        pub cruise_mm_per_s: f32 = LogicConfig::default().cruise_mm_per_s,
+        /// How far the line sensors are ahead of the wheels' axle, in mm.
+        pub sensor_ahead_mm: f32 = LogicConfig::default().sensor_ahead_mm,
+        /// Speed of a turn on the spot at that duty, in degrees per second.
+        pub turn_deg_per_s: f32 = LogicConfig::default().turn_deg_per_s,
+        /// Width of the tape, in mm.
+        pub tape_mm: f32 = LogicConfig::default().tape_mm,
+        /// How far the ranger at the front is ahead of the wheels' axle, in mm.
+        pub ranger_ahead_mm: f32 = LogicConfig::default().ranger_ahead_mm,
+        /// Battery in tenths of a volt. Below this the robot stands at the next crossing until the
+        /// battery is charged or a person has put the robot down again. 0 = never.
+        pub low_battery_decivolts: u8 = LogicConfig::default().low_battery_decivolts,
+        /// How far the ranger at the front sees, in cm: from 11 to 255. 0 = there is no ranger, and
+        /// the robot looks along no way. A thing blocks a way if it is at least 10 cm nearer than
+        /// this distance and than the next crossing.
+        pub ranger_cm: u8 = 80,
+        /// After how many seconds the robot tries blocked ways again, before it calls a goal
+        /// unreachable.
+        pub try_again_s: u32 = LogicConfig::default().try_again.as_secs() as u32,
+        /// The positions of shoulder and elbow when the claw is around goods that stand as they
+        /// should in front of the robot, in units of 0.29 degrees. A robot that picks by itself
+        /// moves them there.
+        pub reach_shoulder: u16 = LogicConfig::default().reach_shoulder,
+        pub reach_elbow: u16 = LogicConfig::default().reach_elbow,
+        /// Who picks the goods up: "manual" (a person moves the arm and says when it is done) or
+        /// "auto" (the robot by itself). Unset, it is "manual" on real boards without `--script`,
+        /// and "auto" everywhere else.
+        pub pick: Option<Pick> = None,
+    }
 }
 
 impl LogicSection {
-    /// Refuses a robot that the navigator could not drive, with a sentence.
+    /// Refuses a robot that the navigator could not drive. The error is a sentence.
     pub fn validate(&self) -> Result<()> {
         // Not a number is in no range.
         for (key, value, range) in [
@@ -90,53 +99,5 @@ impl LogicSection {
             );
         }
         Ok(())
-    }
-}
-
-/// Who picks the goods up: `lager_topics::Pick` as a word of the configuration and of a command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum PickBy {
-    /// A person moves the arm and says when it is done.
-    Manual,
-    /// The robot, by itself.
-    Auto,
-}
-
-impl PickBy {
-    /// As it stands in the file.
-    pub const fn key(self) -> &'static str {
-        match self {
-            Self::Manual => "manual",
-            Self::Auto => "auto",
-        }
-    }
-}
-
-impl From<PickBy> for lager_topics::Pick {
-    fn from(pick: PickBy) -> Self {
-        match pick {
-            PickBy::Manual => Self::Manual,
-            PickBy::Auto => Self::Auto,
-        }
-    }
-}
-
-impl Default for LogicSection {
-    fn default() -> Self {
-        let config = LogicConfig::default();
-        Self {
-            cruise_mm_per_s: config.cruise_mm_per_s,
-            sensor_ahead_mm: config.sensor_ahead_mm,
-            turn_deg_per_s: config.turn_deg_per_s,
-            tape_mm: config.tape_mm,
-            ranger_ahead_mm: config.ranger_ahead_mm,
-            low_battery_decivolts: config.low_battery_decivolts,
-            ranger_cm: 80,
-            try_again_s: config.try_again.as_secs() as u32,
-            reach_shoulder: config.reach_shoulder,
-            reach_elbow: config.reach_elbow,
-            pick: None,
-        }
     }
 }

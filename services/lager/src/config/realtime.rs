@@ -1,37 +1,44 @@
-//! `[realtime]`: who gets what of the machine, and what would leave too little to the others.
+//! `[realtime]`: priorities, memory and cores of the services. Refuses settings that leave too
+//! little to other programs. The simulated robot never competes with the path.
 
 use lager_topics::Role;
-use serde::{Deserialize, Serialize};
 
+use super::section::section;
 use super::{Config, Waiting};
 use crate::realtime::{CoreSet, RealtimeError, Wanted, allowed_cores, refuse_starvation};
 
-/// `[realtime]`: what bridge and logic, the services on the path from sensor to steering, want of
-/// the machine.
-///
-/// The simulated robot stands for boards that have processors of their own: it never competes
-/// with the path, and only a core can be chosen for it.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RealtimeSection {
-    /// Priority under `SCHED_FIFO`, 1 to 99; 0 is the normal scheduler.
-    pub priority: u8,
-    /// Keep all their memory from being paged out.
-    pub lock_memory: bool,
-    /// The cores each may run on.
-    pub cores: CoresSection,
+section! {
+    "realtime"
+    /// What bridge and logic, the services on the path from sensor to steering, ask of the machine.
+    pub struct RealtimeSection {
+        /// Priority of the bridge under SCHED_FIFO, 1 to 99; 0 is the normal scheduler. Logic gets
+        /// one less and the bridge's readers two less, at least 1, unless they wait by spinning.
+        /// Choose at most 49: on a PREEMPT_RT kernel the interrupt threads that bring the boards'
+        /// bytes have 50.
+        /// Needs LimitRTPRIO= in the systemd unit, `ulimit -r`, or CAP_SYS_NICE: `lager doctor` tries it.
+        pub priority: u8 = 0,
+        /// Keep all memory of bridge and logic in RAM (mlockall): some 40 MiB each, of which 25 MiB
+        /// would not be in RAM otherwise.
+        /// Needs LimitMEMLOCK= in the systemd unit, `ulimit -l`, or CAP_IPC_LOCK: `lager doctor` tries it.
+        pub lock_memory: bool = false,
+        pub cores: CoresSection = CoresSection::default(),
+    }
 }
 
-/// `[realtime.cores]`: the cores of each service, empty for any.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CoresSection {
-    /// Cores of the bridge.
-    pub bridge: CoreSet,
-    /// Cores of logic.
-    pub logic: CoreSet,
-    /// Cores of the simulated robot.
-    pub simulator: CoreSet,
+section! {
+    "realtime.cores"
+    /// The cores each service may run on, by number from 0; none means any. On one core, such as
+    /// bridge = [3] and logic = [3], they wake each other sooner than across two. With "spin" or
+    /// "adaptive" each needs its own. isolcpus=3 on the kernel's command line keeps all other
+    /// programs away from core 3.
+    pub struct CoresSection {
+        /// The services on the path.
+        pub bridge: CoreSet = CoreSet::default(),
+        pub logic: CoreSet = CoreSet::default(),
+        /// The simulated robot stands for boards with processors of their own. It can only have
+        /// cores.
+        pub simulator: CoreSet = CoreSet::default(),
+    }
 }
 
 impl RealtimeSection {
@@ -45,10 +52,10 @@ impl RealtimeSection {
         }
     }
 
-    /// The services that priority and locked memory are for.
+    /// The services that can have priority and locked memory.
     pub const ON_PATH: [Role; 2] = [Role::Bridge, Role::Logic];
 
-    /// What the process of `role` wants.
+    /// What the process of `role` asks of the machine.
     pub fn wanted(&self, role: Role) -> Wanted {
         let on_path = Self::ON_PATH.contains(&role);
         Wanted {
@@ -66,11 +73,11 @@ impl RealtimeSection {
 }
 
 impl Config {
-    /// Refuses what would leave nothing to the others: services that never sleep, at a real-time
-    /// priority, on too many cores. Each of `roles` has beside it what its process wants.
+    /// Refuses services that never sleep, at a real-time priority, on so many cores that other
+    /// programs get none. Each of `roles` comes with what its process asks of the machine.
     ///
     /// # Errors
-    /// That, as a [`RealtimeError`].
+    /// Such a refusal, as a [`RealtimeError`].
     pub fn refuse_starvation(&self, roles: &[(Role, Wanted)]) -> Result<(), RealtimeError> {
         let spinners: Vec<CoreSet> = roles
             .iter()

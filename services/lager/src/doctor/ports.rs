@@ -1,15 +1,16 @@
-//! Who else has a board's serial port open: `ModemManager`, a getty, a serial monitor.
+//! Finds other programs that have a board's serial port open: `ModemManager`, a getty, a serial
+//! monitor.
 //!
-//! Two readers of one port share its bytes, and each loses what the other gets. The kernel tells
-//! who has it open (`/proc/PID/fd`), of this user's processes, and root of everybody's. Of others
-//! only names are known, so those are named that are known to open serial ports, and those on whose
-//! command line the port stands.
+//! Two readers of one port share its bytes, and each loses those that the other gets. The kernel
+//! says who has the port open (`/proc/PID/fd`), but only of this user's processes; root sees all.
+//! Of other users' processes only names are known. So the check reports programs that are known to
+//! open serial ports, and programs that name the port on their command line.
 
 use std::fs::{self, Metadata};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-/// Programs that open serial ports unasked.
+/// Programs that open serial ports by themselves.
 const MEDDLERS: [&str; 2] = ["ModemManager", "brltty"];
 
 /// A process that is not the robot's and has a port open, or may.
@@ -18,12 +19,12 @@ pub struct Other {
     pid: u32,
     name: String,
     port: PathBuf,
-    /// Whether it was seen to have it open.
+    /// Whether it certainly has the port open.
     is_sure: bool,
 }
 
 impl Other {
-    /// What it does and how to end that.
+    /// What it does, and how to end it.
     pub fn said(&self) -> String {
         let Self {
             pid,
@@ -43,11 +44,11 @@ impl Other {
             }
             _ => format!("`kill {pid}` ends it"),
         };
-        format!("process {pid} ({name}) {does}; it reads bytes that the robot then lacks; {end}")
+        format!("process {pid} ({name}) {does}; the robot loses the bytes that it reads; {end}")
     }
 }
 
-/// The processes that have one of `ports` open, but for `own` ones, or may have.
+/// The processes, except `own`, that have one of `ports` open or may have it open.
 pub fn others(ports: &[&PathBuf], own: &[u32]) -> Vec<Other> {
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     let mut found = Vec::new();
@@ -83,7 +84,7 @@ pub fn others(ports: &[&PathBuf], own: &[u32]) -> Vec<Other> {
     found
 }
 
-/// Whether a process has a port open; `None` if it is another user's, which is not told.
+/// Whether a process has a port open; `None` if the process is another user's.
 fn is_open(process: &Path, port: &Path) -> Option<bool> {
     let of_port = fs::metadata(port).ok()?;
     let is_same = |of: &Metadata| of.file_type().is_char_device() && of.rdev() == of_port.rdev();
@@ -91,10 +92,10 @@ fn is_open(process: &Path, port: &Path) -> Option<bool> {
     Some(files.any(|file| fs::metadata(file.path()).is_ok_and(|of| is_same(&of))))
 }
 
-/// Whether a process that cannot be looked into may have the port open.
+/// Whether another user's process may have the port open.
 fn is_suspect(process: &Path, name: &str, port: &Path) -> bool {
     let command = fs::read(process.join("cmdline")).unwrap_or_default();
-    // The port that a link leads to has the name that others use.
+    // If the port is a link, other programs use the name that it leads to.
     let port = fs::canonicalize(port).unwrap_or_else(|_| port.to_owned());
     let port_name = port.file_name().unwrap_or_default().to_string_lossy();
     let mut words = command.split(|byte| *byte == 0);

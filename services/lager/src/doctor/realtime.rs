@@ -1,8 +1,8 @@
-//! What `lager doctor` finds out about real time: it tries what `lager up` would be granted, and
-//! looks for settings of this machine that make reactions late.
+//! `lager doctor` about real time: it tries what `lager up` would ask for, and looks for settings
+//! of this machine that make reactions late.
 //!
-//! An option that was asked for and is refused is bad. An option that was not asked for is at most
-//! a hint.
+//! If the user asks for an option and the machine refuses it, the result is bad. Without such a
+//! wish it is at most a hint.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,19 +13,19 @@ use super::Finding::{self, Bad, Good, Hint};
 use crate::config::{Config, RealtimeSection, Waiting};
 use crate::realtime::{self, CoreSet, RealtimeError, Wanted};
 
-/// The priority that is tried where none is configured.
+/// The priority to try if none is configured.
 const SUGGESTED_PRIORITY: u8 = 20;
 /// The priority of the kernel's interrupt threads on `PREEMPT_RT`.
 const INTERRUPT_PRIORITY: u8 = 50;
-/// An idle core that takes longer than this to come back shows in a hop, in µs.
+/// An idle core that takes longer than this to wake up makes a hop slower, in µs.
 const LATE_IDLE_US: u64 = 20;
 /// The kernel's default slack, in ns.
 const USUAL_SLACK_NS: u64 = 50_000;
-/// On which cores the kernel's workers may run, among them those that hand a serial port's bytes to
-/// who reads them: hexadecimal numbers of 32 bits with commas between them.
+/// On which cores the kernel's workers may run; some of them pass on a serial port's bytes. The
+/// file has hexadecimal numbers of 32 bits with commas between them.
 const WORKERS: &str = "/sys/devices/virtual/workqueue/cpumask";
 
-/// All of them, each with its name.
+/// All checks of real time, each with its name.
 pub fn findings(config: &Config) -> Vec<(&'static str, Finding)> {
     let cpus = Path::new("/sys/devices/system/cpu");
     vec![
@@ -87,7 +87,7 @@ fn memory(configured: bool) -> Finding {
     }
 }
 
-/// What is refused, but was not asked for either.
+/// The result if the machine refuses what nobody has asked for.
 fn unasked(flag: &str, error: &RealtimeError) -> Finding {
     Hint(format!("not used; with {flag}: {error}"))
 }
@@ -147,7 +147,7 @@ fn waiting(config: &Config) -> Finding {
     }
 }
 
-/// The cores on which the kernel's workers may run; none where the kernel does not show them.
+/// The cores on which the kernel's workers may run; empty if the kernel does not say.
 fn worker_cores(mask: &Path) -> CoreSet {
     let mask = line(mask).unwrap_or_default();
     let digits = mask.chars().rev().filter_map(|digit| digit.to_digit(16));
@@ -160,14 +160,14 @@ fn worker_cores(mask: &Path) -> CoreSet {
         .collect()
 }
 
-/// Where the kernel hands over what serial ports receive. A worker that comes to a core where
-/// somebody looks for samples starts at once, and one that is called from another core late.
+/// Where the kernel passes on the bytes of serial ports. A worker on the core of a service that
+/// spins runs at once; a worker that must be called from another core runs late.
 fn workers(may_run_on: &CoreSet, config: &Config) -> Finding {
     if may_run_on.is_empty() {
         return Good("where they run is not shown by this kernel".into());
     }
     let bridge = config.realtime.wanted(Role::Bridge).cores;
-    // A bridge in real time would keep a worker from its core for as long as it looks.
+    // A bridge in real time would keep a worker off its core while it spins.
     let matters = config.bus.waiting == Waiting::Adaptive && config.realtime.priority == 0;
     if !matters || (bridge.len() == 1 && *may_run_on == bridge) {
         return Good(format!(
@@ -189,7 +189,7 @@ fn workers(may_run_on: &CoreSet, config: &Config) -> Finding {
     }
 }
 
-/// What the kernel lets real-time threads take.
+/// How much time the kernel gives to real-time threads.
 fn share(throttle: Option<(i64, i64)>, config: &Config) -> Finding {
     let spins = config.bus.waiting == Waiting::Spin && config.realtime.priority > 0;
     match throttle {

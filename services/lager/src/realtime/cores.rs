@@ -6,18 +6,18 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// A set of cores by the kernel's numbers, which start at 0. Empty means no choice was made.
+/// A set of cores by the kernel's numbers, which start at 0. An empty set means that nobody chose.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct CoreSet(BTreeSet<usize>);
 
 impl CoreSet {
-    /// Whether no choice was made.
+    /// Whether nobody chose.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// How many cores there are in it.
+    /// How many cores it has.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -27,7 +27,7 @@ impl CoreSet {
         self.0.iter().copied()
     }
 
-    /// Whether `core` is one of them.
+    /// Whether it has `core`.
     pub fn contains(&self, core: usize) -> bool {
         self.0.contains(&core)
     }
@@ -39,7 +39,7 @@ impl FromIterator<usize> for CoreSet {
     }
 }
 
-/// Ranges and single numbers with commas between them, as in the files of the kernel.
+/// Reads ranges and single numbers with commas between them, as in the kernel's files.
 impl fmt::Display for CoreSet {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut cores = self.iter().peekable();
@@ -76,7 +76,7 @@ impl FromStr for CoreSet {
                 Some((first, last)) => (number(first)?, number(last)?),
                 None => (number(part)?, number(part)?),
             };
-            // The kernel's own sets end there, and a typing error must not fill the memory.
+            // The kernel's own sets end there. A mistyped number must not fill the memory.
             if last < first || last >= rustix::thread::CpuSet::MAX_CPU {
                 return Err(wrong());
             }

@@ -1,4 +1,4 @@
-//! Why real time is not granted, in sentences that say how to get it and how to do without.
+//! Why a process does not get real time, in sentences that say how to get it and how to do without.
 
 use std::io;
 
@@ -6,10 +6,10 @@ use thiserror::Error;
 
 use super::{CoreSet, LOCKED_AT_MOST};
 
-/// Why a process does not get what it wants of the machine.
+/// Why a process does not get what it asks of the machine.
 #[derive(Debug, Error)]
 pub enum RealtimeError {
-    /// The user's rights do not reach.
+    /// The user's rights are too small.
     #[error(
         "real-time priority {priority} is not granted: this user may use {} \
          (allow it with LimitRTPRIO={priority} in the systemd unit, a line `USER - rtprio {priority}` in \
@@ -18,12 +18,12 @@ pub enum RealtimeError {
         at_most(*allowed)
     )]
     PriorityDenied {
-        /// What was asked for.
+        /// The wished priority.
         priority: u8,
         /// The limit of this process.
         allowed: u64,
     },
-    /// The rights would do, but real-time threads get no time here.
+    /// The rights are sufficient, but the kernel gives real-time threads no time here.
     #[error(
         "real-time priority {priority} is within this user's rights and the kernel refuses it all the same: \
          there is no time for real-time threads where this process runs (see that /proc/sys/kernel/sched_rt_runtime_us \
@@ -31,7 +31,7 @@ pub enum RealtimeError {
          in the root group; a container needs --cap-add=sys_nice; or leave --realtime away, [realtime] priority = 0)"
     )]
     NoTimeForGroup {
-        /// What was asked for.
+        /// The wished priority.
         priority: u8,
     },
     /// The kernel has another reason.
@@ -39,12 +39,12 @@ pub enum RealtimeError {
         "real-time priority {priority} is not granted: {error}; leave --realtime away to run without"
     )]
     Priority {
-        /// What was asked for.
+        /// The wished priority.
         priority: u8,
         /// The kernel's reason.
         error: io::Error,
     },
-    /// Too little memory may be locked.
+    /// The user may lock too little memory.
     #[error(
         "memory cannot be locked: a service needs up to {} MiB and this user may lock {} KiB \
          (allow it with LimitMEMLOCK={}M in the systemd unit, a line `USER - memlock {}` in /etc/security/limits.conf \
@@ -65,27 +65,27 @@ pub enum RealtimeError {
         "memory cannot be locked: {0}; free some, or leave --lock-memory away ([realtime] lock_memory = false)"
     )]
     Lock(io::Error),
-    /// The machine does not have it.
+    /// The machine does not have this core.
     #[error(
         "there is no core {core}: this machine has the cores {existing}; choose others with --core or [realtime.cores], \
          or leave the choice away"
     )]
     NoSuchCore {
-        /// What was asked for.
+        /// The wished core.
         core: usize,
-        /// What there is.
+        /// The machine's cores.
         existing: CoreSet,
     },
-    /// A control group withholds it.
+    /// A control group forbids this core.
     #[error(
         "core {core} is withheld from this process, which may use the cores {allowed}: choose among them with --core or \
          [realtime.cores], or give it core {core} (AllowedCPUs= in the systemd unit, --cpuset-cpus of a container, \
          cpuset.cpus of its control group)"
     )]
     CoreNotAllowed {
-        /// What was asked for.
+        /// The wished core.
         core: usize,
-        /// What may be used.
+        /// The allowed cores.
         allowed: CoreSet,
     },
     /// The kernel has another reason.
@@ -93,7 +93,7 @@ pub enum RealtimeError {
         "the process cannot be bound to cores: {0}; leave --core and [realtime.cores] away to run without"
     )]
     Pin(io::Error),
-    /// Services that never sleep would have all cores.
+    /// Services that never sleep would take all cores.
     #[error(
         "waiting = \"spin\" at a real-time priority keeps {spinners} of the {cores} cores this robot may use busy for good, \
          and nothing else would run there, this shell included: use [bus] waiting = \"adaptive\" or \"block\", \
@@ -115,12 +115,12 @@ pub enum RealtimeError {
         /// The cores they share.
         cores: CoreSet,
     },
-    /// No thread to try it in.
+    /// The system gives no thread for the trial.
     #[error("no thread can be started: {0}; see `ulimit -u`")]
     Rehearsal(io::Error),
 }
 
-/// A limit on priorities in words.
+/// A limit of priorities, in words.
 fn at_most(limit: u64) -> String {
     match limit {
         0 => "none".to_owned(),

@@ -1,7 +1,8 @@
-//! Cores and memory as asked of the kernel, and what it answers when asked what is allowed.
+//! Asks the kernel for cores and memory, and what it allows.
 //!
-//! It is apart because it has this crate's only `unsafe`, and because everything here acts on the
-//! calling thread or process at once. It chooses nothing and explains nothing.
+//! This file stands apart because it has this crate's only `unsafe` of real time, and because
+//! everything here acts on the calling thread or process at once. It chooses nothing and explains
+//! nothing.
 
 #![allow(
     unsafe_code,
@@ -17,8 +18,8 @@ use rustix::thread::{CapabilitySet, CpuSet, sched_getaffinity, sched_setaffinity
 
 use super::CoreSet;
 
-/// Lets the calling thread, and all threads it starts from now on, run on `cores` alone. Returns
-/// what was granted: the kernel leaves out without a word what a control group does not allow.
+/// Lets the calling thread, and all threads that it starts later, run only on `cores`. Returns the
+/// cores that the kernel granted: it silently leaves out those that a control group forbids.
 pub fn pin(cores: &CoreSet) -> io::Result<CoreSet> {
     let mut wanted = CpuSet::new();
     for core in cores.iter().filter(|core| *core < CpuSet::MAX_CPU) {
@@ -28,7 +29,7 @@ pub fn pin(cores: &CoreSet) -> io::Result<CoreSet> {
     granted()
 }
 
-/// The cores the calling thread may run on now.
+/// The cores on which the calling thread may run now.
 pub fn granted() -> io::Result<CoreSet> {
     let granted = sched_getaffinity(None)?;
     Ok((0..CpuSet::MAX_CPU)
@@ -36,10 +37,10 @@ pub fn granted() -> io::Result<CoreSet> {
         .collect())
 }
 
-/// Keeps in memory what this process has mapped and whatever it maps from now on.
+/// Keeps all memory of this process in RAM, also memory that it maps later.
 ///
-/// The C library's allocator would reserve 64 MiB of addresses for each thread, all of which count
-/// as locked although they are never filled; so all threads share the first thread's reserve.
+/// The C library's allocator would reserve 64 MiB of addresses for each thread. All of them would
+/// count as locked although they are never filled, so all threads share the first thread's reserve.
 pub fn lock_memory() -> io::Result<()> {
     #[cfg(target_env = "gnu")]
     // SAFETY: two numbers are passed, and no other thread exists yet that could be allocating.
@@ -51,8 +52,8 @@ pub fn lock_memory() -> io::Result<()> {
     )?)
 }
 
-/// Whether the kernel would let this process lock `bytes` more. They are reserved and given back
-/// without ever being filled.
+/// Whether the kernel would let this process lock `bytes` more. This reserves them, never fills
+/// them, and gives them back.
 pub fn try_lock(bytes: usize) -> io::Result<()> {
     // SAFETY: a new private mapping at an address of the kernel's choice touches no memory of
     // this process; it is not accessed, and it is unmapped once, with its own length.
@@ -70,8 +71,8 @@ pub fn try_lock(bytes: usize) -> io::Result<()> {
 }
 
 /// Raises the soft limit of `resource` to the hard one, which needs no right, and returns it;
-/// `None` is no limit. A soft limit is only a default: who asks for real time wants all he may
-/// have.
+/// `None` is no limit. A soft limit is only a default, and a user who asks for real time wants all
+/// that the rights allow.
 pub fn whole_limit(resource: Resource) -> Option<u64> {
     let limit = getrlimit(resource);
     if limit.current != limit.maximum {

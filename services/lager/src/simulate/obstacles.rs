@@ -5,9 +5,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use lager_floor::{Edge, Heading, Node};
 use lager_plant::noise::Noise;
-use lager_plant::{Obstacle, Product, Side, Warehouse};
-use lager_topics::{FailureKind, Goal, Heading, NavigatorStatus, Phase, Remedy};
+use lager_plant::{NamedProduct, Obstacle, Warehouse};
+use lager_topics::{FailureKind, Goal, NavigatorStatus, Phase, Remedy};
 
 use super::Whole;
 use crate::config::Config;
@@ -16,9 +17,9 @@ use crate::config::Config;
 const LIMIT: Duration = Duration::from_secs(3_000);
 
 /// The built-in warehouse with things on these edges.
-fn with_obstacles(name: &str, edges: &[[[u8; 2]; 2]]) -> Warehouse {
+fn with_obstacles(name: &str, edges: &[[Node; 2]]) -> Warehouse {
     let mut warehouse = Warehouse::builtin(name).expect("built in");
-    let stands = |between: &[[u8; 2]; 2]| Obstacle { between: *between };
+    let stands = |between: &[Node; 2]| Obstacle { between: *between };
     warehouse.obstacles.extend(edges.iter().map(stands));
     warehouse
 }
@@ -49,8 +50,8 @@ fn goods_without_a_way_are_unreachable_and_the_failure_says_what_would_end_it() 
     let warehouse = Warehouse::builtin("small").expect("built in");
     let product = &warehouse.products[0];
     // On the goods' own edge.
-    let edge = lager_plant::Edge::of(product.square, product.side);
-    let closed = with_obstacles("small", &[[edge.from, edge.to]]);
+    let edge = Edge::of(product.square, product.side);
+    let closed = with_obstacles("small", &[edge.ends()]);
     let mut whole = whole(&closed, &[product.id], 1, 0);
     let why = whole.run(LIMIT).expect("a failure");
     assert!(why.contains("I cannot get from"), "{why}");
@@ -61,19 +62,19 @@ fn goods_without_a_way_are_unreachable_and_the_failure_says_what_would_end_it() 
 
 #[test]
 fn a_mission_in_a_large_hall_full_of_things_goes_the_shortest_ways_that_the_robot_knows_of() {
-    let product = |id, square, side| Product {
+    let product = |id, [x, y]: [u8; 2], side| NamedProduct {
         id,
         name: None,
-        square,
+        square: Node::new(x, y),
         side,
     };
     let mut hall = Warehouse {
-        size: [20, 20],
-        delivery: [0, 0],
+        size: Node::new(20, 20),
+        delivery: Node::new(0, 0),
         products: vec![
-            product(1, [9, 8], Side::Up),
-            product(2, [3, 12], Side::Left),
-            product(3, [18, 1], Side::Right),
+            product(1, [9, 8], Heading::Up),
+            product(2, [3, 12], Heading::Left),
+            product(3, [18, 1], Heading::Right),
         ],
         ..Warehouse::builtin("small").expect("built in")
     };
@@ -81,20 +82,21 @@ fn a_mission_in_a_large_hall_full_of_things_goes_the_shortest_ways_that_the_robo
     let mut edges = BTreeMap::new();
     while edges.len() < 60 {
         let [x, y] = [0, 0].map(|_: u8| (noise.bits() % 20) as u8);
-        let to = [[x + 1, y], [x, y + 1]][noise.bits() as usize % 2];
+        let side = [Heading::Down, Heading::Left][noise.bits() as usize % 2];
+        let edge = Edge::of(Node::new(x, y), side);
         // The way out of the corner, and the goods' own, stay open.
-        let is_free = hall.products.iter().all(|product| {
-            let own = lager_plant::Edge::of(product.square, product.side);
-            [own.from, own.to] != [[x, y], to]
-        });
+        let is_free = hall
+            .products
+            .iter()
+            .all(|product| Edge::of(product.square, product.side) != edge);
         if x + y > 2 && is_free {
-            edges.insert([x, y], to);
+            edges.insert([x, y], edge);
         }
     }
-    let stands = |(from, to)| Obstacle {
-        between: [from, to],
+    let stands = |edge: Edge| Obstacle {
+        between: edge.ends(),
     };
-    hall.obstacles.extend(edges.into_iter().map(stands));
+    hall.obstacles.extend(edges.into_values().map(stands));
     let mut whole = whole(&hall, &[1, 2], 3, 0);
     let decisions = run_beside_oracle(&mut whole, &hall);
     assert!(decisions > 60, "only {decisions} decisions");
@@ -106,7 +108,8 @@ fn a_mission_in_a_large_hall_full_of_things_goes_the_shortest_ways_that_the_robo
     assert_eq!(whole.robot.world().collisions(), 0);
 }
 
-type Node = [i16; 2];
+/// A node as the oracle counts, which also looks beside the floor.
+type At = [i16; 2];
 
 /// Runs the mission to its end, and compares the way planned at each node with the oracle's. How
 /// many have been compared.
@@ -140,15 +143,18 @@ fn run_beside_oracle(whole: &mut Whole, warehouse: &Warehouse) -> u32 {
     }
 }
 
+fn node(node: Node) -> At {
+    [node.x, node.y].map(i16::from)
+}
+
 /// Where the robot must get to.
-fn goals(warehouse: &Warehouse, status: &NavigatorStatus) -> Vec<Node> {
-    let node = |[x, y]: [u8; 2]| [i16::from(x), i16::from(y)];
+fn goals(warehouse: &Warehouse, status: &NavigatorStatus) -> Vec<At> {
     match status.goal.get() {
         Some(Goal::Product) => {
-            let is_it = |product: &&Product| product.id == status.product;
+            let is_it = |product: &&NamedProduct| product.id == status.product;
             let product = warehouse.products.iter().find(is_it).expect("a product");
-            let edge = lager_plant::Edge::of(product.square, product.side);
-            vec![node(edge.from), node(edge.to)]
+            let edge = Edge::of(product.square, product.side);
+            edge.ends().map(node).to_vec()
         }
         Some(Goal::Delivery | Goal::Home) => vec![node(warehouse.delivery)],
         _ => Vec::new(),
@@ -156,7 +162,7 @@ fn goals(warehouse: &Warehouse, status: &NavigatorStatus) -> Vec<Node> {
 }
 
 /// Steps along the headings, in their order.
-const STEPS: [Node; 4] = [[-1, 0], [0, 1], [1, 0], [0, -1]];
+const STEPS: [At; 4] = [[-1, 0], [0, 1], [1, 0], [0, -1]];
 
 fn quarters(from: usize, to: usize) -> u32 {
     [0, 1, 2, 1][(4 + to - from) % 4]
@@ -184,10 +190,10 @@ fn best(
     warehouse: &Warehouse,
     whole: &Whole,
     status: &NavigatorStatus,
-    goals: &[Node],
+    goals: &[At],
 ) -> Option<(u32, u32)> {
     let ways = whole.navigator.blocks();
-    let is_open = |[x, y]: Node, along: usize| {
+    let is_open = |[x, y]: At, along: usize| {
         !ways.ways().iter().any(|way| {
             let heading = way
                 .heading
@@ -198,7 +204,7 @@ fn best(
             (one, heading) == ([x, y], along) || (other, (heading + 2) % 4) == ([x, y], along)
         })
     };
-    let [width, height] = warehouse.size.map(i16::from);
+    let [width, height] = node(warehouse.size);
     let start = ([status.x, status.y], status.heading.get()? as usize);
     let mut costs = BTreeMap::from([(start, (0, 0))]);
     let mut open = vec![start];
@@ -215,6 +221,6 @@ fn best(
             }
         }
     }
-    let is_goal = |((at, _), _): &(&(Node, usize), &(u32, u32))| goals.contains(at);
+    let is_goal = |((at, _), _): &(&(At, usize), &(u32, u32))| goals.contains(at);
     costs.iter().filter(is_goal).map(|(_, cost)| *cost).min()
 }

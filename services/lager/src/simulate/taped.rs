@@ -61,11 +61,7 @@ impl Tape {
 #[test]
 fn the_same_recorded_inputs_give_byte_identical_commands_twice() {
     let warehouse = Warehouse::builtin("curved").expect("built in");
-    let mission: Vec<i32> = warehouse
-        .map_products()
-        .map(|(id, ..)| id)
-        .take(2)
-        .collect();
+    let mission: Vec<i32> = warehouse.products.iter().take(2).map(|p| p.id).collect();
     let robot =
         |seed| Whole::new(&Config::default(), &warehouse, &mission, seed, 3).expect("a robot");
     let mut first = robot(7);

@@ -4,11 +4,11 @@
 use std::time::Duration;
 
 use lager_plant::{Floor, Warehouse};
+use lager_supervisor::mission::{Helper, Watch};
 use lager_topics::{FailureKind, Hold, Remedy};
 
 use super::Whole;
 use crate::config::Config;
-use crate::mission::{Helper, Watch};
 
 /// Virtual time in which a mission must be over.
 const LIMIT: Duration = Duration::from_secs(600);

@@ -1,13 +1,14 @@
-//! `lager map`: the warehouse and what is blocked in it, as logic goes by them.
+//! `lager map`: the warehouse and its blocked ways, as logic knows them.
 
 use std::fmt::Write;
 
 use anyhow::{Result, bail};
-use lager_lines::Called;
-use lager_station::Warehouse;
+use lager_floor::Heading;
+use lager_plant::Warehouse;
+use lager_sample::Tag;
 use lager_topics::{
-    BlockSource, BlockedWays, GoneGoods, GoneWhy, GoodState, Heading, Input, InputKind,
-    MissionQueue, NavBlocks, NavMap, OrderQueue, Side, Tag, TruthPose, WarehouseMap,
+    BlockSource, BlockedWays, GoneGoods, GoneWhy, GoodState, NavBlocks, NavMap, TruthPose,
+    WarehouseMap,
 };
 
 use super::{Operator, first};
@@ -29,49 +30,14 @@ impl Operator {
             &self.bus,
             &self.patience,
         )?;
-        // Where no name is known there are numbers.
+        // Products without a known name have their number.
         let names = goods::described(&self.running).ok();
-        let queue = first(
-            &mut self.bus.subscriber::<MissionQueue>()?,
-            &self.bus,
-            &self.patience,
-        )?;
-        Ok(described(&map, &ways, queue.gone(), names.as_ref()))
+        Ok(described(&map, &ways, self.queue()?.gone(), names.as_ref()))
     }
 
-    /// `lager map back`: goods are in their place again, as logic then shows.
-    ///
-    /// # Errors
-    /// Nobody is called so, or logic does not react.
-    pub fn back(&self, product: Option<&Called>) -> Result<String> {
-        let id = product.map(|product| goods::number(&self.running, product));
-        let id = id.transpose()?;
-        let is_gone = |queue: &OrderQueue| match id {
-            Some(id) => queue.gone().iter().any(|gone| gone.product == id),
-            None => !queue.gone().is_empty(),
-        };
-        let mut queue = self.bus.subscriber::<MissionQueue>()?;
-        if !is_gone(&first(&mut queue, &self.bus, &self.patience)?) {
-            return Ok(match id {
-                Some(id) => format!("nobody has missed product {id}"),
-                None => "no goods are missed".into(),
-            });
-        }
-        self.must_be_there(id)?;
-        let coded = id.map_or(Input::ALL_GOODS, i32::cast_unsigned);
-        self.say_until(InputKind::GoodsBack, coded, &mut queue, |queue| {
-            !is_gone(queue)
-        })?;
-        Ok(match id {
-            Some(id) => format!("product {id} is in its place again"),
-            None => "all goods are in their places again".into(),
-        })
-    }
-}
-
-impl Operator {
-    /// A simulated world knows whether goods are on their shelves, and nobody puts them back there.
-    fn must_be_there(&self, product: Option<i32>) -> Result<()> {
+    /// Refuses it in a simulated world, which knows where goods are and where nobody puts them
+    /// back.
+    pub(super) fn must_be_there(&self, product: Option<i32>) -> Result<()> {
         if self.running.body.service().is_none() {
             return Ok(());
         }
@@ -148,12 +114,12 @@ fn described(
     text
 }
 
-fn side(side: Tag<Side>) -> &'static str {
+fn side(side: Tag<Heading>) -> &'static str {
     match side.get() {
-        Some(Side::Left) => "left",
-        Some(Side::Up) => "upper side",
-        Some(Side::Right) => "right",
-        Some(Side::Down) => "lower side",
+        Some(Heading::Left) => "left",
+        Some(Heading::Up) => "upper side",
+        Some(Heading::Right) => "right",
+        Some(Heading::Down) => "lower side",
         None => "unknown side",
     }
 }
@@ -186,7 +152,7 @@ mod tests {
         map.products[0] = MapProduct {
             id: 7,
             x: 1,
-            side: Side::Up.into(),
+            side: Heading::Up.into(),
             ..MapProduct::default()
         };
         let floor = "2 x 1 squares of 50 cm; delivery at (0, 0)\n\

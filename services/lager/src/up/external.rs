@@ -1,4 +1,4 @@
-//! The external computer of a robot that is up: whether it is started here, and where it listens.
+//! The external computer of a robot that is up: whether `up` starts it, and where it listens.
 //!
 //! ```text
 //!   --no-station            none: `up` tells the robot its warehouse
@@ -13,17 +13,17 @@
 //! port that is free, to whoever has the token in the address that `up` prints.
 //!
 //! A robot and a station of its own prove to each other that they know a secret: the one in the
-//! robot's folder, which only this user can read, or the one in `--secret`. Another robot that
-//! joins the station of a robot on this bus is told where that one's secret lies. A station that is
-//! somebody else's is believed unless there is a `--secret`.
+//! robot's folder, which only this user can read, or the one in `--secret`. If another robot joins
+//! that station, it learns where this secret lies. Without `--secret` the robot believes a station
+//! of somebody else.
 //!
-//! The socket is opened here and handed to the station as its standard output, so the port stays
-//! the same when a station dies, and a robot that connects meanwhile waits for its successor.
+//! `up` opens the socket and hands it to the station as its standard output. So the port stays the
+//! same when a station dies, and a robot that connects meanwhile waits for the next station.
 //!
 //! Station and comm end after bridge and logic, and no process that moves the robot waits for them.
-//! They publish nothing that says they live, so they write signs of life instead, and one that does
-//! not is replaced. A robot that is driven through them stops after 150 ms of the station's silence;
-//! any other goes on.
+//! They publish nothing that shows that they live, so they write signs of life; `up` replaces one
+//! that does not. A robot that somebody drives through them stops after 150 ms of the station's
+//! silence. A robot that drives by itself goes on.
 
 use std::fs;
 use std::net::{SocketAddr, TcpListener};
@@ -34,11 +34,11 @@ use anyhow::{Context, Result, bail};
 use lager_comm::secrets_at;
 use lager_lines::Name;
 use lager_panel::Tokens;
+use lager_supervisor::runtime_folder::{NameLock, RuntimeFolder};
 
 use crate::config::{Config, StationSection};
 use crate::goods;
 use crate::reach;
-use crate::runtime::{NameLock, RuntimeFolder};
 use crate::station;
 
 /// The choice, and what to tell people about it.
@@ -46,18 +46,18 @@ use crate::station;
 pub struct External {
     /// Where a station of this robot's own listens.
     pub listener: Option<TcpListener>,
-    /// What is told of it.
+    /// What to tell people of it.
     pub told: String,
-    /// What is told of the panel.
+    /// What to tell people of the panel.
     pub panel: Option<String>,
-    /// What is told of the gateway.
+    /// What to tell people of the gateway.
     pub gateway: Vec<String>,
 }
 
-/// Chooses, and puts into `config` what comm is to know.
+/// Chooses, and puts into `config` what comm needs.
 ///
 /// # Errors
-/// The place of the bus cannot be had, or the secret that is asked for.
+/// The folder of the bus or the secret's file cannot be read.
 pub fn choose(config: &mut Config, lock: &mut NameLock, headless: bool) -> Result<External> {
     if let Some(file) = &mut config.comm.secret {
         *file = std::path::absolute(&*file)?;
@@ -76,7 +76,7 @@ pub fn choose(config: &mut Config, lock: &mut NameLock, headless: bool) -> Resul
         Some(_) => {
             let secret = lock.make_secret()?;
             if config.comm.secret.is_none() {
-                config.comm.secret = Some(RuntimeFolder::secret(config)?);
+                config.comm.secret = Some(RuntimeFolder::secret(&config.bus()?)?);
             }
             Some(Tokens::of(&secret))
         }
@@ -105,8 +105,8 @@ pub fn choose(config: &mut Config, lock: &mut NameLock, headless: bool) -> Resul
     Ok(external)
 }
 
-/// A panel is shown by a station, and this robot has none of its own: where the one is that there
-/// is.
+/// Only a station shows a panel, and this robot starts none. Says where the panel of the other
+/// station is.
 fn without(wanted: SocketAddr, other: Option<String>) -> String {
     let why = format!(
         "there is no panel at {wanted}: only a station of this robot's own would show one there (--listen ADDRESS starts one)"
@@ -117,7 +117,7 @@ fn without(wanted: SocketAddr, other: Option<String>) -> String {
     }
 }
 
-/// Where the panel is to answer.
+/// Where the panel answers.
 fn panel(wanted: Option<SocketAddr>) -> Result<SocketAddr> {
     let Some(wanted) = wanted else {
         return station::usual_panel();
@@ -127,7 +127,7 @@ fn panel(wanted: Option<SocketAddr>) -> Result<SocketAddr> {
             "{wanted} can be reached by others; `lager station --panel {wanted}` asks them for a token"
         );
     }
-    let socket = TcpListener::bind(wanted).with_context(|| format!("{wanted} cannot be had"))?;
+    let socket = TcpListener::bind(wanted).with_context(|| format!("{wanted} is not free"))?;
     Ok(socket.local_addr()?)
 }
 
@@ -146,7 +146,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         }
         let believed = match config.comm.secret {
             Some(_) => "",
-            None => "; whoever answers there is believed, with --secret FILE it proves who it is",
+            None => "; the robot believes whoever answers there (--secret FILE asks for a proof)",
         };
         return Ok(External {
             listener: None,
@@ -174,7 +174,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         Ok(listener) => return Ok(own(config, listener, "")),
         Err(error) => error,
     };
-    // Who wants a GaG of this robot's own wants a station of its own.
+    // A user who wants a GaG of this robot also wants a station of this robot.
     if config.station.gag.is_none()
         && let Some(theirs) = neighbour(config)?
     {
@@ -192,7 +192,7 @@ fn station_for(config: &mut Config) -> Result<External> {
             told,
         });
     }
-    let why = format!(", since {} cannot be had: {taken}", StationSection::USUAL);
+    let why = format!(", since {} is not free: {taken}", StationSection::USUAL);
     Ok(match TcpListener::bind("127.0.0.1:0") {
         Ok(listener) => own(config, listener, &why),
         Err(error) => none(config, &error.into()),
@@ -228,14 +228,14 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
     }
 }
 
-/// A robot of this user's on this bus that is up, has a station of its own at the usual address,
-/// and drives in the same warehouse, as it was started.
+/// A robot of this user on this bus that is up, was started with the same warehouse, and has a
+/// station of its own at the usual address.
 fn neighbour(config: &Config) -> Result<Option<Config>> {
     let warehouse = config.warehouse()?;
     let is_it = |theirs: &Config| {
         let gag = match &theirs.station.gag {
             Some(gag) => Ok(gag.clone()),
-            None => RuntimeFolder::gag(theirs),
+            None => theirs.bus().and_then(|bus| RuntimeFolder::gag(&bus)),
         };
         let serves = gag
             .and_then(|gag| Ok(fs::symlink_metadata(gag)?.file_type().is_socket()))
@@ -247,18 +247,18 @@ fn neighbour(config: &Config) -> Result<Option<Config>> {
     Ok(others(config)?.into_iter().find(is_it))
 }
 
-/// The file of the secret by which another robot on this bus talks to the station at `address`.
+/// The file of the secret with which another robot on this bus talks to the station at `address`.
 fn secret_for(config: &Config, address: &str) -> Result<Option<PathBuf>> {
     let talks = |theirs: &Config| theirs.station.address.as_deref() == Some(address);
     let mut others = others(config)?.into_iter();
     Ok(others.find(talks).and_then(|theirs| theirs.comm.secret))
 }
 
-/// The robots on this bus that are up, as they were started.
+/// The robots on this bus that are up, with the configurations of their starts.
 fn others(config: &Config) -> Result<Vec<Config>> {
     let bus = config.bus()?;
-    let up = bus.place()?.up();
-    let names = up.keys().map(lager_ports::RobotName::as_str);
+    let up = bus.home()?.up();
+    let names = up.keys().map(lager_home::UnitName::as_str);
     let others = names
         .filter(|name| *name != config.name)
         .filter_map(|name| {
@@ -266,7 +266,7 @@ fn others(config: &Config) -> Result<Vec<Config>> {
                 name: name.to_owned(),
                 ..config.clone()
             };
-            RuntimeFolder::running(&theirs).ok().flatten()
+            theirs.of_running_robot().ok().flatten()
         });
     Ok(others.collect())
 }

@@ -1,5 +1,5 @@
-//! The arm's manoeuvres: picking goods up and letting them go. Each of their steps is an order that
-//! runs once.
+//! The arm's manoeuvres: picking goods up and letting them go. Each of their steps is a one-shot
+//! order.
 //!
 //! ```text
 //!   pick:  aim, open -> reach, close -> lift, hold -> to the carry pose -> something there? -> Done
@@ -7,19 +7,20 @@
 //!              +-- aim elsewhere, five times -+------------------------------+-------> Failed
 //! ```
 //!
-//! What was gripped badly slips out after seconds. So the goods are held over their stand until
-//! they would have slipped: there they fall back onto it, and can be gripped better.
+//! Goods in a bad grip slip out after seconds. So the arm holds them over their stand until they
+//! would have slipped: there they fall back onto it, and the robot can grip them better.
 //!
 //! The robot stands while the arm works. Its progress is published, so that a successor goes on
-//! with the same attempt; it repeats a move that may already have been made.
+//! with the same attempt. It repeats a move that may already have been made.
 //!
 //! When the steering board or the bridge has restarted, nobody knows where the arm is: without
-//! torque it sags. Then the attempt is made again and not counted: from its begin, or, so that the
-//! goods are not let go in the air, from the closing of the claw.
+//! torque it sags. Then the attempt is repeated and does not count. It is repeated from its
+//! beginning, or from the closing of the claw if the claw would drop the goods otherwise.
 
 use core::time::Duration;
 
-use lager_topics::{FailureKind, Finish, Heading, NavigatorStatus};
+use lager_floor::Heading;
+use lager_topics::{FailureKind, Finish, NavigatorStatus};
 use lager_wire::{ArmCommand, Command};
 
 use super::behaviour::Behaviour;
@@ -27,32 +28,31 @@ use super::helm::{Helm, Senses};
 use super::steps::{BASE_JOINT, ELBOW_JOINT, Joint, SHOULDER_JOINT, Steps};
 use crate::arm::ArmSeen;
 use crate::config::LogicConfig;
-use crate::outcome::Outcome;
+use crate::ending::Ending;
 
-/// Steps for one joint after which something must be wrong with the arm.
+/// If one joint takes more steps than this, something is wrong with the arm.
 const MOST_STEPS: u16 = 400;
-/// Where to aim at each attempt, from straight ahead: there first, then 20 and 40 mm to either
-/// side.
+/// Where to aim at each attempt: straight ahead first, then 20 and 40 mm to either side.
 const AIMS: [i16; 5] = [0, 21, -21, 42, -42];
 /// Moves of one attempt.
 const MOVES: u8 = 9;
-/// The one that closes the claw.
+/// The number of the move that closes the claw.
 const SQUEEZE: u8 = 4;
 
 /// One move of an attempt.
 enum Move {
     /// Give a command once.
     Once(ArmCommand),
-    /// Step a joint until it stands at a position.
+    /// Step a joint until it reaches a position.
     Bring(&'static Joint, u16),
-    /// Hold what was gripped, and see whether it stays.
+    /// Hold the goods, and see whether they stay.
     Hold,
 }
 
-/// What the arm is to do.
+/// What the arm has to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Task {
-    /// Bring the goods in front of the robot to where they are carried.
+    /// Take the goods in front of the robot, to the carry pose.
     Pick,
     /// Let them go.
     Drop,
@@ -62,10 +62,10 @@ pub(crate) enum Task {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ArmSequence {
     task: Task,
-    /// Attempts and moves of this one that are done.
+    /// How many attempts are over, and how many moves of this one.
     attempt: u8,
     moves: u8,
-    /// How many steps the move at hand has taken.
+    /// How many steps the present move has taken.
     count: u16,
     steps: Steps,
     /// When the claw was closed.
@@ -75,7 +75,7 @@ pub(crate) struct ArmSequence {
 }
 
 impl ArmSequence {
-    /// One that begins when the robot has come to rest.
+    /// A routine that begins when the robot has come to rest.
     pub(crate) const fn new(task: Task) -> Self {
         Self {
             task,
@@ -89,7 +89,7 @@ impl ArmSequence {
     }
 
     /// Whether the board or the bridge has restarted since the last move. A successor of the
-    /// navigator, who did not see it, knows it by servos that nobody has heard.
+    /// navigator, who did not see it, concludes it from servos that have not reported.
     fn is_of_another_life(&mut self, arm: &ArmSeen) -> bool {
         let Some(life) = arm.life() else {
             return false;
@@ -101,7 +101,7 @@ impl ArmSequence {
     }
 
     /// Gives the next step of the attempt, or judges it.
-    fn pick(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn pick(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         let (profile, arm) = (&helm.config.arm, helm.senses.arm);
         if self.is_of_another_life(&arm) {
             self.moves = if self.moves > SQUEEZE { SQUEEZE } else { 0 };
@@ -131,7 +131,7 @@ impl ArmSequence {
                         if self.count > MOST_STEPS {
                             let seen = arm.position(joint.servo).map_or(0.0, f32::from);
                             let jammed = FailureKind::ArmJammed;
-                            return Some(Outcome::Failed(jammed, f32::from(to), seen));
+                            return Some(Ending::Failed(jammed, f32::from(to), seen));
                         }
                         self.steps.give(step, helm);
                         return None;
@@ -142,13 +142,13 @@ impl ArmSequence {
             self.count = 0;
         }
         if !is_empty {
-            return Some(Outcome::Done);
+            return Some(Ending::Done);
         }
         let attempts = AIMS.len() as u8;
         if self.attempt + 1 == attempts {
             let attempts = f32::from(attempts);
             let nothing = FailureKind::GoodsMissing;
-            return Some(Outcome::Failed(nothing, attempts, attempts));
+            return Some(Ending::Failed(nothing, attempts, attempts));
         }
         (self.attempt, self.moves) = (self.attempt + 1, 0);
         self.pick(helm)
@@ -160,9 +160,9 @@ impl Behaviour for ArmSequence {
         self.steps.wanted()
     }
 
-    fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Ending> {
         if finish == Finish::Done && self.task == Task::Drop {
-            return Some(Outcome::Done);
+            return Some(Ending::Done);
         }
         let step = self.steps.ended(finish)?;
         if step == ArmCommand::Squeeze {
@@ -173,7 +173,7 @@ impl Behaviour for ArmSequence {
     }
 
     /// Gives the next step when the one before has ended.
-    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         match self.steps.may_go_on(helm) {
             Err(failed) => return Some(failed),
             Ok(false) => {}
@@ -203,7 +203,7 @@ impl Behaviour for ArmSequence {
     }
 }
 
-/// The moves of an attempt in their order: to the goods, and to where they are carried.
+/// The moves of an attempt in their order: to the goods, and to the carry pose.
 fn next_move(done: u8, aim: i16, config: &LogicConfig) -> Move {
     let carry = &config.arm.carry;
     match done {

@@ -1,18 +1,19 @@
-//! Driving straight back until the odometer reads so many mm: away from the cross bar, to turn
-//! round, or to where there is room for a turn.
+//! Drives straight back to a reading of the odometer: away from the cross bar, to turn round, or to
+//! a place with room for a turn.
 
 use core::time::Duration;
 
-use lager_topics::{Heading, NavigatorStatus};
+use lager_floor::Heading;
+use lager_topics::NavigatorStatus;
 use lager_wire::{Command, WheelCommand};
 
 use super::behaviour::Behaviour;
 use super::helm::{Helm, Senses};
 use super::turn::{Spot, Turn};
 use crate::config::LogicConfig;
-use crate::outcome::Outcome;
+use crate::ending::Ending;
 
-/// How old a distance may be that tells whether there is room to turn.
+/// How old a distance may be to show whether there is room to turn.
 const IN_SIGHT: Duration = Duration::from_millis(500);
 /// Driving back.
 const BACKWARD: Command = Command::Wheel(WheelCommand::ManualBackward);
@@ -20,23 +21,23 @@ const BACKWARD: Command = Command::Wheel(WheelCommand::ManualBackward);
 /// A drive straight back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BackUp {
-    /// What the odometer reads at its end, in mm.
+    /// The odometer's reading at its end, in mm.
     to_mm: f32,
-    /// What it ends in.
-    then: Outcome,
+    /// Its ending.
+    then: Ending,
 }
 
 impl BackUp {
-    /// A drive back that is a phase's own.
+    /// A drive back that is the phase's own manoeuvre.
     pub(crate) fn to(to_mm: f32) -> Self {
-        let then = Outcome::Done;
+        let then = Ending::Done;
         Self { to_mm, then }
     }
 
-    /// What must come before a turn here: away from what stands so close behind the node that a
-    /// corner of the body would touch it; away from the node ahead, as a turn so near to it would
-    /// end on the tape that crosses there; or, for the same reason, instead of the turn to the node
-    /// that the robot has just left.
+    /// The drive back that a turn here needs first. A thing so close behind the node would touch a
+    /// corner of the body. A turn so near to the node ahead would end on the tape that crosses
+    /// there. For the same reason a drive back may replace the turn to the node that the robot has
+    /// just left.
     pub(super) fn before(turn: &Turn, helm: &Helm<'_>) -> Option<Self> {
         let travelled_mm = helm.senses.odometer.travelled_mm;
         let (nearest_mm, coast_mm) = (helm.config.nearest_turn_mm(), helm.config.coast_mm);
@@ -48,22 +49,22 @@ impl BackUp {
         match turn.spot {
             Spot::Along(_) if travelled_mm < nearest_mm => Some(Self::to(coast_mm)),
             Spot::Along(length_mm) => {
-                // A way out may be so short that there is no place between both.
+                // A way out may be so short that it has no place between both.
                 let farthest_mm = (length_mm - nearest_mm).max(nearest_mm + 2.0 * coast_mm);
                 (travelled_mm > farthest_mm).then_some(Self {
                     to_mm: farthest_mm - coast_mm,
-                    then: Outcome::Ready,
+                    then: Ending::Ready,
                 })
             }
             Spot::Node if travelled_mm > room_at_mm => Some(Self {
                 to_mm: room_at_mm,
-                then: Outcome::Ready,
+                then: Ending::Ready,
             }),
             _ => None,
         }
     }
 
-    /// The same as a predecessor left it, which had `ordered` this in place of the turn.
+    /// The same, as an earlier navigator left it; its order `ordered` stood in place of the turn.
     pub(super) fn kept(
         turn: &Turn,
         status: &NavigatorStatus,
@@ -73,10 +74,10 @@ impl BackUp {
         let at_mm = status.travelled_mm as f32;
         (ordered == BACKWARD).then(|| match turn.spot {
             Spot::Along(_) if at_mm < config.nearest_turn_mm() => Self::to(config.coast_mm),
-            // It ends here, and what room there is now is looked at anew.
+            // It ends here, and the room is checked again.
             _ => Self {
                 to_mm: at_mm,
-                then: Outcome::Ready,
+                then: Ending::Ready,
             },
         })
     }
@@ -87,12 +88,12 @@ impl Behaviour for BackUp {
         BACKWARD
     }
 
-    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         (helm.senses.odometer.travelled_mm <= self.to_mm).then_some(self.then)
     }
 }
 
-/// By how much the robot must back up for its corners to pass what stands close ahead, in mm.
+/// How far the robot must back up so that its corners pass a thing close ahead, in mm.
 fn missing_room_mm(helm: &Helm<'_>) -> f32 {
     let Helm { senses, config, .. } = helm;
     let is_of_now = |(seen_at, _): &(Duration, u8)| {

@@ -1,12 +1,13 @@
-//! What a manoeuvre can do. Its defaults are what most of them do.
+//! The trait of all manoeuvres. Its defaults are right for most of them.
 
-use lager_topics::{Finish, Heading, NavigatorStatus};
+use lager_floor::Heading;
+use lager_topics::{Finish, NavigatorStatus};
 use lager_wire::{Command, LineState};
 
 use super::helm::{Helm, Senses};
 use crate::config::LogicConfig;
+use crate::ending::Ending;
 use crate::marks::Mark;
-use crate::outcome::Outcome;
 
 /// One thing that the robot does.
 pub(crate) trait Behaviour {
@@ -22,37 +23,37 @@ pub(crate) trait Behaviour {
         _state: LineState,
         _mark: Option<Mark>,
         _helm: &mut Helm<'_>,
-    ) -> Option<Outcome> {
+    ) -> Option<Ending> {
         None
     }
 
     /// Takes a distance: something may stand on the way.
-    fn range(&mut self, _centimetres: u8, _helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn range(&mut self, _centimetres: u8, _helm: &mut Helm<'_>) -> Option<Ending> {
         None
     }
 
-    /// An order that runs once has ended.
-    fn ended(&mut self, _finish: Finish, _helm: &mut Helm<'_>) -> Option<Outcome> {
+    /// A one-shot order has ended.
+    fn ended(&mut self, _finish: Finish, _helm: &mut Helm<'_>) -> Option<Ending> {
         None
     }
 
-    /// Goes on where time and the odometer allow it.
-    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome>;
+    /// Goes on, as far as time and the odometer allow.
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending>;
 
     /// Whether it turns the wheels.
     fn turns_wheels(&self) -> bool {
         true
     }
 
-    /// Has it stand for a moment and judge how far it has come, if it is one that runs once.
+    /// Makes it stand for a moment and judge how far it has come, if it has one-shot orders.
     fn interrupt(&mut self) {}
 
-    /// The board is heard again after a silence: a turn may have ended, or not.
+    /// The board reports again after a silence: a turn may have ended, or not.
     fn hear_again(&mut self) {}
 
-    /// As a predecessor left it, by what it published of it; `ordered` was in force.
+    /// The manoeuvre as an earlier navigator published it, with `ordered` in force.
     fn restore(&mut self, _status: &NavigatorStatus, _ordered: Command) {}
 
-    /// Writes into a status what a successor needs of it.
+    /// Writes what a successor needs into a status.
     fn fill(&self, _status: &mut NavigatorStatus) {}
 }

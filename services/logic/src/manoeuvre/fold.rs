@@ -1,5 +1,4 @@
-//! Bringing the arm back to where it is carried, before the robot leaves goods that it has not
-//! picked up.
+//! Brings the arm back to its carry pose, before the robot leaves goods that it has not picked up.
 //!
 //! ```text
 //!   shoulder up -> elbow in -> base back -> all joints where they are carried: Ready
@@ -9,16 +8,18 @@
 //!
 //! The claw stays as it is. A successor looks where the joints are, and goes on from there.
 
-use lager_topics::{Finish, Heading, NavigatorStatus};
+use lager_floor::Heading;
+use lager_topics::{Finish, NavigatorStatus};
 use lager_wire::Command;
 
 use super::behaviour::Behaviour;
 use super::helm::{Helm, Senses};
 use super::steps::{BASE_JOINT, ELBOW_JOINT, SHOULDER_JOINT, Steps};
 use crate::config::LogicConfig;
-use crate::outcome::Outcome;
+use crate::ending::Ending;
 
-/// Steps of all joints after which something must be wrong with the arm: its whole way twice.
+/// If all joints together take more steps than this, something is wrong with the arm. It is twice
+/// the arm's whole way.
 const MOST_STEPS: u16 = 800;
 
 /// The arm on its way back.
@@ -27,7 +28,7 @@ pub(crate) struct Fold {
     steps: Steps,
     /// How many steps it has taken.
     count: u16,
-    /// Its own part has ended: what is still off is a person's.
+    /// It has done its own part: a person must do the rest.
     is_over: bool,
 }
 
@@ -45,16 +46,16 @@ impl Behaviour for Fold {
         self.steps.wanted()
     }
 
-    fn ended(&mut self, finish: Finish, _: &mut Helm<'_>) -> Option<Outcome> {
+    fn ended(&mut self, finish: Finish, _: &mut Helm<'_>) -> Option<Ending> {
         self.steps.ended(finish);
         None
     }
 
-    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         let (carry, arm) = (helm.config.arm.carry, helm.senses.arm);
         if self.is_over {
             let off = arm.joint_off(carry, helm.config.carry_tolerance);
-            return off.is_none().then_some(Outcome::Ready);
+            return off.is_none().then_some(Ending::Ready);
         }
         match self.steps.may_go_on(helm) {
             Ok(false) => return None,

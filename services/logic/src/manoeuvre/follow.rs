@@ -1,5 +1,5 @@
-//! Following a line until something comes: the node at its end, a pick station's mark, the cross
-//! bar of the delivery, or the corner on the way back from there.
+//! Follows a line until something comes: the node at its end, a pick station's mark, the cross bar
+//! of the delivery, or the corner on the way back from there.
 //!
 //! The sensors run ahead of the axle, so a drive to a node has two steps:
 //!
@@ -10,39 +10,40 @@
 //!                                                  the axle still has the rest to go
 //! ```
 //!
-//! Each judged mark sets the odometer anew: the sensors have just left the tape's far edge. What
-//! the floor promises is looked up once, when the drive begins.
+//! Each judged mark corrects the odometer: the sensors have just left the tape's far edge. The
+//! navigator asks the map for the edge once, when the drive begins.
 //!
-//! At a pick station the mark alone says where the robot is. The document would also have it use
-//! its distance to the shelf (L7, L9), which would place it worse. Of 300 simulated robots that
-//! turned in by the mark none stood more than 7 mm from its place, while their rangers, as they
-//! come out of the box, were up to 25 mm wrong about it: a board's table is the datasheet's typical
-//! one, and the shelf is 11 cm away, where a ranger tells whole centimetres and nothing under 10
-//! (2026-11-24, `services/lager/src/simulate/placed.rs`). A claw grips firmly within 25 mm.
+//! At a pick station only the mark says where the robot is. The document would also use its
+//! distance to the shelf (L7, L9), but that would place it worse. Of 300 simulated robots that
+//! turned in by the mark none stood more than 7 mm from its place, while new rangers were up to 25
+//! mm wrong. A board's table is the datasheet's typical one, and at the shelf, 11 cm away, a ranger
+//! gives whole centimetres and nothing under 10 (2026-11-24,
+//! `services/lager/src/simulate/placed.rs`). A claw grips firmly within 25 mm.
 
 use core::time::Duration;
 
-use lager_topics::{FailureKind, Heading, NavigatorStatus, Step, Thought, ThoughtKind};
+use lager_floor::Heading;
+use lager_topics::{FailureKind, NavigatorStatus, Step, Thought, ThoughtKind};
 use lager_wire::{Command, LineState, WheelCommand};
 
 use super::behaviour::Behaviour;
 use super::helm::{Helm, Senses, is_no_line, turning_place};
 use crate::config::LogicConfig;
-use crate::judge::{Edge, Verdict, judge};
+use crate::ending::Ending;
+use crate::judge::{EdgeMarks, Verdict, judge};
 use crate::marks::{Mark, Sides};
-use crate::outcome::Outcome;
 
-/// A pause between line frames in which no mark passes unseen: the sensors take about 200 ms to
+/// In a shorter pause between line frames no mark can pass unseen: the sensors take about 200 ms to
 /// cross one.
 const LONGEST_GAP: Duration = Duration::from_millis(100);
 
-/// How near the axle is to its node when a thing behind that is looked at once more, in mm: from
-/// farther away the ranger does not tell it from one that stands where there is room.
+/// If a thing stands behind the node, the robot looks at it again when the axle is this near to the
+/// node, in mm. From farther away the ranger does not show whether there is room.
 const CLOSE_MM: f32 = 60.0;
-/// The front of the body, 170 mm ahead of the axle, comes to rest so far behind the node, in mm.
+/// How far behind the node the body's front (170 mm ahead of the axle) comes to rest, in mm.
 const FRONT_MM: f32 = 175.0;
 
-/// Frames in a row without the line after which it has ended behind the cross bar.
+/// After this many frames in a row without the line, it has ended behind the cross bar.
 const ENDED: u8 = 3;
 
 /// What ends the drive.
@@ -50,7 +51,7 @@ const ENDED: u8 = 3;
 pub(crate) enum Until {
     /// The node at the end of the edge.
     Node,
-    /// The mark of the goods' station; failing that, the node.
+    /// The mark of the goods' station, or else the node.
     Station,
     /// The cross bar at the end of the way out.
     Bar,
@@ -58,11 +59,11 @@ pub(crate) enum Until {
     Corner,
 }
 
-/// What the floor promises on the way.
+/// What the map has on the way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ahead {
     /// The edge; none on the way out, whose length is unknown.
-    pub(crate) edge: Option<Edge>,
+    pub(crate) edge: Option<EdgeMarks>,
     /// Tape goes straight on at its end.
     pub(crate) goes_on: bool,
     /// On which side the goods of the order stand.
@@ -75,17 +76,17 @@ pub(crate) struct Follow {
     pub(crate) until: Until,
     pub(crate) step: Step,
     ahead: Ahead,
-    /// Where the line went out of sight, in the odometer's mm.
+    /// Where the line disappeared, in the odometer's mm.
     lost_at: Option<f32>,
-    /// When the last line frame came, if they have come all along since this navigator began the
-    /// drive: no mark has passed unseen then.
+    /// When the last line frame came, if this navigator has had all frames since the drive began:
+    /// then no mark has passed unseen.
     watched: Option<Duration>,
     /// Frames in a row without the line, behind the cross bar.
     bare: u8,
 }
 
 impl Follow {
-    /// A drive from where the robot stands, or in the middle of one that a predecessor began.
+    /// A drive from where the robot stands, or the rest of a drive that an earlier navigator began.
     pub(crate) fn new(until: Until, ahead: Ahead) -> Self {
         Self {
             until,
@@ -97,13 +98,14 @@ impl Follow {
         }
     }
 
-    /// The floor is known, or known anew, in the middle of the drive.
+    /// The floor is known, or another one, in the middle of the drive.
     pub(crate) fn look_ahead(&mut self, ahead: Ahead) {
         self.ahead = ahead;
     }
 
-    /// What the map promises on the line while the next mark is looked for; none once it is found.
-    pub(crate) fn sought(&self) -> Option<&Edge> {
+    /// What the map has on the line while the robot looks for the next mark; `None` once it is
+    /// found.
+    pub(crate) fn sought(&self) -> Option<&EdgeMarks> {
         self.ahead
             .edge
             .as_ref()
@@ -131,7 +133,7 @@ impl Follow {
         match judge(&edge, mark.sides, at_mm, tolerance) {
             Verdict::Node => {
                 if self.until == Until::Corner {
-                    // A way that the robot has measured itself teaches nothing about its wheels.
+                    // A way whose length the robot measured itself says nothing about its wheels.
                     senses.odometer.forget_way();
                 }
                 senses.set_by_mark(edge.length_mm, config);
@@ -154,7 +156,7 @@ impl Follow {
         }
     }
 
-    /// A mark seen from close by: the node's, if it is anywhere near its place.
+    /// A mark that is seen from close by is the node's, if it is anywhere near the node.
     fn correct_by_node(&mut self, mark: Mark, helm: &mut Helm<'_>) {
         let Some(edge) = self.ahead.edge else { return };
         let off_mm = (helm.senses.mark_at(helm.config) - edge.length_mm).abs();
@@ -167,14 +169,14 @@ impl Follow {
 
     /// The cross bar at the end of the way out is the place of delivery (E4, AMB-18).
     ///
-    /// Left at an angle the bar can look like a line for some frames more, so the end of the line
-    /// is waited for.
+    /// If the robot leaves it at an angle, the bar can look like a line for some more frames. So
+    /// the navigator waits for the end of the line.
     fn look_for_cross_bar(
         &mut self,
         mark: Option<Mark>,
         state: LineState,
         helm: &mut Helm<'_>,
-    ) -> Option<Outcome> {
+    ) -> Option<Ending> {
         let mark_at = helm.senses.mark_at(helm.config);
         match mark {
             Some(mark) if mark.sides == Sides::BOTH => {
@@ -191,13 +193,13 @@ impl Follow {
             return None;
         }
         // A few frames may be noise, and goods that are released before the bar are not delivered.
-        // The frames that made up the mark do not count as the end of the line.
+        // The frames of the mark itself do not count as the end of the line.
         self.bare = match is_no_line(state) {
             true => self.bare.saturating_add(1),
             false => 0,
         };
         if self.bare >= ENDED {
-            return Some(Outcome::Done);
+            return Some(Ending::Done);
         }
         if mark_at > helm.senses.exit_mm + helm.config.bar_end_mm {
             self.step = Step::Seeking;
@@ -206,8 +208,8 @@ impl Follow {
         None
     }
 
-    /// Notes where the line went out of sight and gives up when it stays away.
-    fn watch_line(&mut self, state: LineState, helm: &mut Helm<'_>) -> Option<Outcome> {
+    /// Notes where the line disappeared, and gives up if it stays away.
+    fn watch_line(&mut self, state: LineState, helm: &mut Helm<'_>) -> Option<Ending> {
         if !is_no_line(state) || self.is_past_the_line(helm.senses, helm.config) {
             self.lost_at = None;
             return None;
@@ -223,7 +225,7 @@ impl Follow {
             true => FailureKind::LineLost,
             false => FailureKind::LineUnseen,
         };
-        (without > most).then_some(Outcome::Failed(kind, most, without))
+        (without > most).then_some(Ending::Failed(kind, most, without))
     }
 
     /// Whether the line has ended at the node where it should, and the node's mark may have passed
@@ -237,13 +239,13 @@ impl Follow {
         senses.sure_sight == Some(state) && off_mm <= edge.length_mm * config.tolerance_cut_short
     }
 
-    /// Whether the corner's mark, on the way back, must have passed without being seen.
+    /// Whether the corner's mark, on the way back, must have passed unseen.
     ///
-    /// The length measured on the way out is less reliable than the mark: wheels that differ are
-    /// faster round a bend to one side than to the other, and the way back is up to a quarter
-    /// longer. Only on a short way are the sensors that far behind the corner before the axle has
-    /// come to it; there the robot may still be beside its line after the turn, and pass beside the
-    /// mark. Where the mark may have passed unseen, the measured length counts at once.
+    /// The length from the way out is less reliable than the mark: unequal wheels are faster round
+    /// a bend to one side than to the other, and the way back may measure up to a quarter more.
+    /// Only on a short way the sensors are so far behind the corner before the axle has reached it.
+    /// There the robot may still be beside its line after the turn, and pass beside the mark. If
+    /// the mark may have passed unseen, the measured length counts at once.
     fn is_behind_unseen_corner(
         &self,
         length_mm: f32,
@@ -262,11 +264,12 @@ impl Follow {
 }
 
 impl Behaviour for Follow {
-    /// Begins on a line on which the robot stands somewhere. A node that is too near for its mark
-    /// to be relied on is driven to by dead reckoning, corrected by the mark if it comes.
+    /// Begins on a line on which the robot stands somewhere. If a node is too near for its mark to
+    /// be reliable, the robot drives there by dead reckoning, and the mark corrects that if it
+    /// comes.
     fn begin(&mut self, helm: &mut Helm<'_>) {
         let sensors_at = helm.senses.odometer.travelled_mm + helm.config.sensor_ahead_mm;
-        let is_near = |edge: Edge| edge.length_mm - sensors_at < helm.config.run_up_mm;
+        let is_near = |edge: EdgeMarks| edge.length_mm - sensors_at < helm.config.run_up_mm;
         if self.until != Until::Bar && self.ahead.edge.is_some_and(is_near) {
             self.step = Step::NearNode;
         }
@@ -275,7 +278,7 @@ impl Behaviour for Follow {
         self.watched = Some(helm.now);
     }
 
-    /// The command the drive needs now.
+    /// The command that the drive needs now.
     fn wanted(&self, senses: &Senses, _: Heading, config: &LogicConfig) -> Command {
         Command::Wheel(match self.is_past_the_line(senses, config) {
             true => WheelCommand::ManualForward,
@@ -284,12 +287,7 @@ impl Behaviour for Follow {
     }
 
     /// Takes a line frame, and the mark that ended with it.
-    fn see(
-        &mut self,
-        state: LineState,
-        mark: Option<Mark>,
-        helm: &mut Helm<'_>,
-    ) -> Option<Outcome> {
+    fn see(&mut self, state: LineState, mark: Option<Mark>, helm: &mut Helm<'_>) -> Option<Ending> {
         let goes_on = |seen: &Duration| helm.now.saturating_sub(*seen) <= LONGEST_GAP;
         self.watched = self.watched.filter(goes_on).map(|_| helm.now);
         let outcome = match (self.until, self.step, mark) {
@@ -307,11 +305,11 @@ impl Behaviour for Follow {
         outcome.or_else(|| self.watch_line(state, helm))
     }
 
-    /// Takes a distance: what stands before the next node, or on it, or so close behind it that the
-    /// body would touch it there, blocks the way; what stands farther behind it is looked at from
-    /// there. The way out is not looked at: there is no other one, and delivered goods lie at its
-    /// end.
-    fn range(&mut self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Outcome> {
+    /// Takes a distance. A thing blocks the way if it stands before the next node, on it, or so
+    /// close behind it that the body would touch it there. If it stands farther behind, the robot
+    /// looks again at the node. It does not look on the way out: there is no other way, and
+    /// delivered goods lie at its end.
+    fn range(&mut self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Ending> {
         let between_nodes = matches!(self.until, Until::Node | Until::Station);
         let edge = self.ahead.edge.filter(|_| between_nodes)?;
         let (config, senses) = (helm.config, &helm.senses);
@@ -330,16 +328,16 @@ impl Behaviour for Follow {
             seen: centimetres.into(),
             ..ThoughtKind::Halts.into()
         });
-        Some(Outcome::Blocked)
+        Some(Ending::Blocked)
     }
 
-    /// Goes on along the line as far as the odometer says.
-    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    /// Goes on along the line, as far as the odometer says.
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         let (config, senses) = (helm.config, &mut *helm.senses);
         let travelled = senses.odometer.travelled_mm;
         if self.until == Until::Bar {
             let longest = config.longest_exit_mm;
-            return (travelled > longest).then_some(Outcome::Failed(
+            return (travelled > longest).then_some(Ending::Failed(
                 FailureKind::BarMissing,
                 longest,
                 travelled,
@@ -350,15 +348,15 @@ impl Behaviour for Follow {
             Step::ToNode | Step::NearNode if travelled >= length_mm - config.coast_mm => {
                 senses.odometer.travelled_mm -= length_mm;
                 return Some(match (self.until, self.step) {
-                    (Until::Station, _) => Outcome::Missed,
+                    (Until::Station, _) => Ending::Missed,
                     (Until::Corner, Step::NearNode) if !is_near(length_mm, config) => {
-                        Outcome::Missed
+                        Ending::Missed
                     }
-                    _ => Outcome::Done,
+                    _ => Ending::Done,
                 });
             }
             Step::ToStation if travelled >= length_mm / 2.0 - config.coast_mm => {
-                return Some(Outcome::Done);
+                return Some(Ending::Done);
             }
             Step::Seeking
                 if self.until == Until::Corner
@@ -370,10 +368,10 @@ impl Behaviour for Follow {
                 let past_mm = travelled - length_mm;
                 if self.until == Until::Corner && past_mm <= config.sensor_ahead_mm {
                     senses.odometer.travelled_mm = past_mm;
-                    return Some(Outcome::Missed);
+                    return Some(Ending::Missed);
                 }
                 let seen = senses.mark_at(config);
-                return Some(Outcome::Failed(FailureKind::NodeMissing, length_mm, seen));
+                return Some(Ending::Failed(FailureKind::NodeMissing, length_mm, seen));
             }
             _ => {}
         }
@@ -389,8 +387,8 @@ impl Behaviour for Follow {
     }
 }
 
-/// Whether the corner is too near for its mark to be relied on when the way back begins where the
-/// robot turns round, on a way out of this length.
+/// Whether the corner is too near for its mark to be reliable, if the way back begins where the
+/// robot turns round on a way out of this length.
 fn is_near(exit_mm: f32, config: &LogicConfig) -> bool {
     turning_place(exit_mm, config) - config.sensor_ahead_mm < config.run_up_mm
 }

@@ -1,9 +1,8 @@
-//! What every manoeuvre uses: what the robot senses of the floor and of itself, and the means to
-//! report.
+//! What all manoeuvres share: what the robot senses of the floor and of itself, and how to report.
 
 use core::time::Duration;
 
-use lager_topics::Heading;
+use lager_floor::Heading;
 use lager_wire::{Command, LineState, WheelCommand};
 
 use crate::arm::ArmSeen;
@@ -21,22 +20,22 @@ pub(crate) const STANDBY: Command = Command::Wheel(WheelCommand::Standby);
 pub(crate) struct Senses {
     pub(crate) odometer: Odometer,
     pub(crate) marks: MarkReader,
-    /// The mark under the sensors was begun by a predecessor: perhaps one frame of noise.
+    /// An earlier navigator began the mark under the sensors; it may be one frame of noise.
     pub(crate) mark_cut_short: bool,
-    /// The line state last seen, and when.
+    /// The last line state, and when it came.
     pub(crate) sight: Option<(Duration, LineState)>,
-    /// The line state that two frames in a row have shown, which one frame of noise cannot be.
+    /// The last line state that two frames in a row have shown. One frame of noise cannot do that.
     pub(crate) sure_sight: Option<LineState>,
-    /// Tape has been seen since the robot was put down, or since this navigator began.
+    /// Whether tape was seen since the robot was put down, or since this navigator began.
     pub(crate) tape_seen: bool,
     /// From the delivery corner to the cross bar, as measured on the way out; 0 = never driven.
     pub(crate) exit_mm: f32,
     pub(crate) arm: ArmSeen,
-    /// What is in front, in cm, and when that was heard.
+    /// The last distance in front, in cm, and when it came.
     pub(crate) distance: Option<(Duration, u8)>,
     /// When the robot last turned.
     pub(crate) turned_at: Duration,
-    /// It came along the line that it looks along, so nothing stands close behind it.
+    /// The robot came along the line along which it looks, so nothing stands close behind it.
     pub(crate) free_behind: bool,
 }
 
@@ -50,12 +49,12 @@ impl Senses {
         }
     }
 
-    /// Where the middle of a tape is that the sensors have just left, in mm from the last node.
+    /// The middle of the tape that the sensors have just left, in mm from the last node.
     pub(crate) fn mark_at(&self, config: &LogicConfig) -> f32 {
         self.odometer.travelled_mm + config.sensor_ahead_mm - config.tape_mm / 2.0
     }
 
-    /// Sets the odometer by a tape whose middle is known to be at `at_mm`.
+    /// Corrects the odometer by a tape whose middle is known to be at `at_mm`.
     pub(crate) fn set_by_mark(&mut self, at_mm: f32, config: &LogicConfig) {
         let missing_mm = at_mm - self.mark_at(config);
         self.odometer.correct(missing_mm);
@@ -67,20 +66,20 @@ pub(crate) fn is_no_line(state: LineState) -> bool {
     matches!(state, LineState::NotOnLine | LineState::DropStation)
 }
 
-/// A standstill before what runs once is judged or begun.
+/// A moment of standing before a one-shot is judged or begun.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Pause {
-    /// None: the robot does what it is about.
+    /// No such moment: the robot does its work.
     #[default]
     None,
-    /// It is to begin.
+    /// It has to begin.
     Wanted,
     /// It ends then.
     Until(Duration),
 }
 
 impl Pause {
-    /// Goes on; whether it has ended now, which it does only where the robot may drive.
+    /// Goes on. Returns whether the moment has ended now; it ends only if the robot may drive.
     pub(crate) fn is_over(&mut self, now: Duration, settle: Duration, active: bool) -> bool {
         match *self {
             Self::Wanted => *self = Self::Until(now + settle),
@@ -108,9 +107,9 @@ pub(crate) struct Helm<'a> {
     pub(crate) out: &'a mut Output,
 }
 
-/// Where the axle stands to turn round on the way out, in mm from the corner: far enough from the
-/// cross bar and, on a short way out, from the corner, because a turn ends on the first tape that
-/// comes under the sensors.
+/// Where the axle must stand to turn round on the way out, in mm from the corner. A turn ends on
+/// the first tape under the sensors, so the place is far enough from the cross bar and, on a short
+/// way out, from the corner.
 pub(crate) fn turning_place(exit_mm: f32, config: &LogicConfig) -> f32 {
     let reach = config.sensor_ahead_mm + config.tape_mm;
     (exit_mm - config.sensor_ahead_mm - config.back_off_mm).max(reach)

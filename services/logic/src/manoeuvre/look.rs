@@ -1,5 +1,5 @@
-//! Standing before a way and looking whether it is open, by distances that are younger than the
-//! last turn (L6).
+//! Stands before a way and looks whether it is open. Only distances from after the last turn count
+//! (L6).
 //!
 //! ```text
 //!   none, or one from before the turn's end ---> stand and wait
@@ -9,23 +9,23 @@
 
 use core::time::Duration;
 
-use lager_topics::Heading;
+use lager_floor::Heading;
 use lager_wire::Command;
 
 use super::behaviour::Behaviour;
 use super::helm::{Helm, STANDBY, Senses};
 use crate::config::LogicConfig;
-use crate::outcome::Outcome;
+use crate::ending::Ending;
 
-/// Age from which a distance says nothing of what is ahead now.
+/// An older distance says nothing of what is ahead now.
 const STALE: Duration = Duration::from_millis(150);
 
 /// A look at the way ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Look {
-    /// A thing that is nearer than this blocks the way, in cm.
+    /// A thing nearer than this blocks the way, in cm.
     limit_cm: u8,
-    /// For how long it must be nearer.
+    /// How long it must be nearer.
     patience: Duration,
     /// The first and the last of the distances that were nearer.
     near: Option<(Duration, Duration)>,
@@ -47,7 +47,7 @@ impl Behaviour for Look {
     }
 
     /// Judges the last distance.
-    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         let (heard, centimetres) = helm.senses.distance?;
         let is_young = heard >= helm.senses.turned_at + helm.config.ranger_lag;
         let is_stale = helm.now.saturating_sub(heard) > STALE;
@@ -55,13 +55,13 @@ impl Behaviour for Look {
             return None;
         }
         if centimetres >= self.limit_cm {
-            return Some(Outcome::Done);
+            return Some(Ending::Done);
         }
         let (first, last) = self.near.unwrap_or((heard, heard));
         self.near = Some((first, heard));
-        // One distance alone may be an accident.
+        // A single distance may be an accident.
         let again = heard > last;
-        (again && heard.saturating_sub(first) >= self.patience).then_some(Outcome::Blocked)
+        (again && heard.saturating_sub(first) >= self.patience).then_some(Ending::Blocked)
     }
 
     fn turns_wheels(&self) -> bool {

@@ -1,16 +1,16 @@
-//! What the robot is doing: one manoeuvre at a time, each with its own state, that ends in an
-//! [`Outcome`]. Here they are listed, and chosen for a phase of the mission.
+//! What the robot does: one manoeuvre at a time, each with its own state, that ends in an
+//! [`Ending`]. This file lists the manoeuvres, and chooses one for a phase of the mission.
 //!
 //! ```text
 //!           a phase           begin             a frame, a report, time
-//!   mission -------> choice ---------> manoeuvre ----------------------> Outcome ---> mission
+//!   mission -------> choice ---------> manoeuvre ----------------------> Ending ---> mission
 //!                      ^                   |  |
 //!                      +------ Ready ------+  +---> the command it needs now
 //! ```
 //!
-//! A manoeuvre knows the line, its marks and the odometer. It does not know its purpose: only the
-//! mission does, which knows no manoeuvre. Only this file knows both. So a new manoeuvre is a file
-//! beside this one and its lines here: where it is listed, and where it is chosen.
+//! A manoeuvre knows the line, its marks and the odometer, but not its purpose. The mission knows
+//! the purpose, but no manoeuvre. Only this file knows both. So a new manoeuvre is a new file, and
+//! two places here: in the list, and where it is chosen.
 
 mod arm;
 mod back_up;
@@ -26,7 +26,9 @@ mod turn;
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Goal, Heading, NavigatorStatus, Phase, Pick, Step};
+use lager_floor::Heading;
+use lager_orders::Pick;
+use lager_topics::{Finish, Goal, NavigatorStatus, Phase, Step};
 use lager_wire::{Command, LineState};
 
 pub(crate) use arm::{ArmSequence, Task};
@@ -40,20 +42,20 @@ pub(crate) use search::Search;
 pub(crate) use stand::Stand;
 pub(crate) use turn::{Spot, Turn};
 
+use crate::belief::Belief;
 use crate::config::LogicConfig;
+use crate::ending::Ending;
 use crate::holding::Holding;
-use crate::judge::Edge;
+use crate::judge::EdgeMarks;
 use crate::map::Map;
 use crate::marks::{Mark, Sides};
 use crate::mission::Mission;
-use crate::outcome::Outcome;
-use crate::place::Place;
 use helm::turning_place;
 
-/// Makes one type of all manoeuvres: each of its methods is the one of the manoeuvre at hand.
+/// Makes one type of all manoeuvres: each of its methods calls that of the present manoeuvre.
 macro_rules! manoeuvres {
     ($($(#[$what:meta])* $name:ident),* $(,)?) => {
-        /// What the robot is doing.
+        /// What the robot does.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub(crate) enum Manoeuvre {
             $($(#[$what])* $name($name)),*
@@ -79,19 +81,19 @@ macro_rules! manoeuvres {
                 state: LineState,
                 mark: Option<Mark>,
                 helm: &mut Helm<'_>,
-            ) -> Option<Outcome> {
+            ) -> Option<Ending> {
                 match self { $(Self::$name(it) => it.see(state, mark, helm)),* }
             }
 
-            fn range(&mut self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Outcome> {
+            fn range(&mut self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Ending> {
                 match self { $(Self::$name(it) => it.range(centimetres, helm)),* }
             }
 
-            fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
+            fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Ending> {
                 match self { $(Self::$name(it) => it.ended(finish, helm)),* }
             }
 
-            fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+            fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
                 match self { $(Self::$name(it) => it.go_on(helm)),* }
             }
 
@@ -131,14 +133,14 @@ manoeuvres! {
     BackUp,
     /// It picks goods up, or lets them go.
     ArmSequence,
-    /// It brings the arm back to where it is carried.
+    /// It brings the arm back to its carry pose.
     Fold,
     /// It looks for the short mark of a station that a disturbed turn may have missed.
     Search,
 }
 
 impl Manoeuvre {
-    /// The manoeuvre of the mission's phase, not begun yet.
+    /// The manoeuvre of the mission's phase, before its beginning.
     pub(crate) fn choose(
         mission: &Mission,
         senses: &Senses,
@@ -148,8 +150,9 @@ impl Manoeuvre {
         let follow = |until| Follow::new(until, ahead(mission, until, senses)).into();
         let turn = |spot| Turn::to(mission.target, spot, mission.half_turn()).into();
         let side_mm = mission.map.as_ref().map_or(0.0, Map::side_mm);
-        let middle = Spot::Edge(side_mm / 2.0);
-        // A robot that picks by itself was told to leave goods over which its arm reaches out.
+        let middle = Spot::EdgeMarks(side_mm / 2.0);
+        // A robot that picks by itself may have to leave goods while its arm still reaches over
+        // them.
         let reaches_out = holding.joint_off.is_some()
             && mission.goal == Goal::Home
             && mission.pick == Pick::Auto
@@ -172,7 +175,7 @@ impl Manoeuvre {
             Phase::Exiting => follow(Until::Bar),
             Phase::Returning => follow(Until::Corner),
             Phase::Turning => turn(Spot::Node),
-            // Turned in, but disturbed meanwhile.
+            // It has turned in, but something disturbed it meanwhile.
             Phase::Positioning if mission.place.heading == mission.target => Search::NEW.into(),
             Phase::Leaving if reaches_out => Fold::NEW.into(),
             Phase::Positioning | Phase::Leaving => turn(middle),
@@ -185,7 +188,7 @@ impl Manoeuvre {
                 Look::new(limit, Duration::ZERO).into()
             }
             Phase::Halted => {
-                // A robot that has halted does not go on because a thing trembles.
+                // If a thing trembles, a robot that has halted does not go on because of that.
                 let limit = config.halt_cm + config.halt_cm / 5;
                 Look::new(limit, config.halt_patience).into()
             }
@@ -194,7 +197,7 @@ impl Manoeuvre {
         }
     }
 
-    /// What must come first, if anything must, before the chosen one begins.
+    /// The manoeuvre that must come before the chosen one, if there is one.
     pub(crate) fn prepare(&mut self, helm: &Helm<'_>) {
         if let Self::Turn(turn) = self
             && let Some(back) = BackUp::before(turn, helm)
@@ -203,7 +206,7 @@ impl Manoeuvre {
         }
     }
 
-    /// As a predecessor left it, by what it published of it; `ordered` was in force.
+    /// The manoeuvre as an earlier navigator published it, with `ordered` in force.
     pub(crate) fn resume(
         &mut self,
         status: &NavigatorStatus,
@@ -226,15 +229,15 @@ impl Manoeuvre {
         }
     }
 
-    /// The step within it, as it is published.
+    /// The step within it, in its published form.
     pub(crate) fn step(&self) -> Step {
         self.line().map_or(Step::Seeking, |follow| follow.step)
     }
 }
 
-/// What the floor promises on the line that the mission's phase drives along.
+/// What the map has on the line along which the mission's phase drives.
 pub(crate) fn ahead(mission: &Mission, until: Until, senses: &Senses) -> Ahead {
-    let Place { node, heading, .. } = mission.place;
+    let Belief { node, heading, .. } = mission.place;
     let Some(map) = &mission.map else {
         return Ahead::default();
     };
@@ -242,17 +245,17 @@ pub(crate) fn ahead(mission: &Mission, until: Until, senses: &Senses) -> Ahead {
     match until {
         Until::Bar => Ahead::default(),
         Until::Corner => Ahead {
-            edge: Some(Edge {
+            edge: Some(EdgeMarks {
                 length_mm: senses.exit_mm,
                 stations: Sides::NONE,
-                crossing: map.crossing_sides(map.delivery(), heading),
+                crossing: map.crossing_sides(map.grid.delivery(), heading),
             }),
             goes_on: true,
             goods: Sides::NONE,
         },
         Until::Node | Until::Station => Ahead {
             edge: map.edge(node, heading),
-            goes_on: map.neighbour(node, heading).is_some_and(tape_behind),
+            goes_on: map.grid.neighbour(node, heading).is_some_and(tape_behind),
             goods: mission
                 .station()
                 .map_or(Sides::NONE, |station| station.side_for(heading)),

@@ -1,12 +1,12 @@
 //! Standing, until the mission has something to do.
 
-use lager_topics::Heading;
+use lager_floor::Heading;
 use lager_wire::Command;
 
 use super::behaviour::Behaviour;
 use super::helm::{Helm, STANDBY, Senses};
 use crate::config::LogicConfig;
-use crate::outcome::Outcome;
+use crate::ending::Ending;
 
 /// The robot stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ impl Behaviour for Stand {
         STANDBY
     }
 
-    fn go_on(&mut self, _: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, _: &mut Helm<'_>) -> Option<Ending> {
         None
     }
 

@@ -1,5 +1,5 @@
-//! Moving the arm step by step: each step is an order that runs once, and is given when the one
-//! before has ended.
+//! Moves the arm step by step. Each step is a one-shot order, and the next one follows when it has
+//! ended.
 //!
 //! ```text
 //!   stand for a moment --> give a step --> Done: the next one
@@ -12,9 +12,9 @@ use lager_wire::{ArmCommand, Command};
 
 use super::helm::{Helm, Pause, STANDBY};
 use crate::arm::{ArmSeen, BASE, ELBOW, SHOULDER};
-use crate::outcome::Outcome;
+use crate::ending::Ending;
 
-/// A joint is where it should be when no further step would bring it nearer.
+/// A joint has arrived when no further step would bring it nearer.
 const NEAR: i32 = 2;
 
 /// One joint, and the commands that step it.
@@ -41,8 +41,8 @@ pub(super) static ELBOW_JOINT: Joint = Joint {
 };
 
 impl Joint {
-    /// The command that brings it nearer, `None` when it is there. A servo that has not reported
-    /// yet is not waited for: the first step makes it report.
+    /// The command that brings it nearer; `None` when it has arrived. It does not wait for a servo
+    /// that has not reported yet: the first step makes it report.
     pub(super) fn step_towards(&self, to: u16, arm: &ArmSeen) -> Option<ArmCommand> {
         let Some(position) = arm.heard(self.servo) else {
             return Some(self.raise);
@@ -55,11 +55,11 @@ impl Joint {
     }
 }
 
-/// The step at work, and how it fares.
+/// The present step, and its state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Steps {
     step: Option<ArmCommand>,
-    /// How often the step at hand has been begun anew.
+    /// How often the present step was begun again.
     pub(super) tries: u8,
     pause: Pause,
 }
@@ -72,7 +72,7 @@ impl Steps {
         pause: Pause::Wanted,
     };
 
-    /// As a predecessor left them, with `ordered` in force.
+    /// The steps as an earlier navigator left them, with `ordered` in force.
     pub(super) fn restore(&mut self, tries: u8, ordered: Command) {
         self.tries = tries;
         if let Command::Arm(step) = ordered {
@@ -81,7 +81,7 @@ impl Steps {
         }
     }
 
-    /// The order for the step at work.
+    /// The order for the present step.
     pub(super) fn wanted(&self) -> Command {
         match self.pause {
             Pause::None => self.step.map_or(STANDBY, Command::Arm),
@@ -89,13 +89,13 @@ impl Steps {
         }
     }
 
-    /// Has the robot stand for a moment before the step at hand is given again.
+    /// Makes the robot stand for a moment before the present step is given again.
     pub(super) fn interrupt(&mut self) {
         self.step = None;
         self.pause = Pause::Wanted;
     }
 
-    /// The order for the step has ended. The step that has been made, if it has.
+    /// The order for the step has ended. Returns the step if it succeeded.
     pub(super) fn ended(&mut self, finish: Finish) -> Option<ArmCommand> {
         match finish {
             Finish::None => None,
@@ -110,11 +110,11 @@ impl Steps {
         }
     }
 
-    /// Whether the next step may be given now.
+    /// Whether the next step may begin now.
     ///
     /// # Errors
-    /// The failure, if the one at hand has been given in vain too often.
-    pub(super) fn may_go_on(&mut self, helm: &mut Helm<'_>) -> Result<bool, Outcome> {
+    /// The failure, if the present step was given in vain too often.
+    pub(super) fn may_go_on(&mut self, helm: &mut Helm<'_>) -> Result<bool, Ending> {
         if self.pause != Pause::None {
             let settle = helm.config.settle;
             if !self.pause.is_over(helm.now, settle, helm.active) {
@@ -125,7 +125,7 @@ impl Steps {
             let (most, tries) = (helm.config.tries, self.tries);
             if tries > most {
                 let (most, tries) = (f32::from(most), f32::from(tries));
-                return Err(Outcome::Failed(FailureKind::BoardRefuses, most, tries));
+                return Err(Ending::Failed(FailureKind::BoardRefuses, most, tries));
             }
         }
         Ok(self.step.is_none() && helm.active)

@@ -1,5 +1,5 @@
-//! Turning on the spot, quarter by quarter. Each quarter is an order that runs once; its end is
-//! read from the bridge's reports.
+//! Turns on the spot, quarter by quarter. Each quarter is a one-shot order; the bridge's reports
+//! show its end.
 //!
 //! ```text
 //!            Done                               Done: the next quarter, or the turn's end
@@ -9,17 +9,17 @@
 //!     +-------> stand for a moment --> judged by angle and line -+
 //! ```
 
-use lager_topics::{FailureKind, Finish, Heading, NavigatorStatus};
+use lager_floor::{Heading, Spin};
+use lager_topics::{FailureKind, Finish, NavigatorStatus};
 use lager_wire::{Command, LineState, WheelCommand};
 
 use super::behaviour::Behaviour;
 use super::helm::{Helm, Pause, STANDBY, Senses};
 use crate::config::LogicConfig;
-use crate::heading::{Compass, Spin};
-use crate::outcome::Outcome;
+use crate::ending::Ending;
 use crate::turn::{Turned, done, interrupted, is_bare};
 
-/// In a status's doubt: the quarter before the one at hand ended without tape.
+/// In a status's doubt: the quarter before the present one ended without tape.
 const FROM_BARE: u8 = 16;
 
 /// Where a turn takes place.
@@ -27,9 +27,9 @@ const FROM_BARE: u8 = 16;
 pub(crate) enum Spot {
     /// On a node.
     Node,
-    /// So many mm behind a node.
-    Edge(f32),
-    /// On a line so many mm long: what lies behind the robot then lies ahead.
+    /// At this distance behind a node, in mm.
+    EdgeMarks(f32),
+    /// On a line of this length in mm: after the turn, what lay behind the robot lies ahead.
     Along(f32),
 }
 
@@ -38,11 +38,11 @@ pub(crate) enum Spot {
 pub(crate) struct Turn {
     target: Heading,
     pub(super) spot: Spot,
-    /// Which way a half turn goes: where its first quarter meets tape too.
+    /// Which way a half turn goes: the way on which its first quarter meets tape, too.
     half: Spin,
-    /// How often the order at hand has been begun anew.
+    /// How often the present order was begun again.
     tries: u8,
-    /// It was cut short, or went on unheard.
+    /// It was cut short, or went on while the board was silent.
     disturbed: bool,
     /// The quarter before ended without tape under the sensors.
     from_bare: bool,
@@ -63,12 +63,12 @@ impl Turn {
         }
     }
 
-    /// The floor is known only now, in the middle of the turn.
+    /// The floor becomes known in the middle of the turn.
     pub(crate) fn learn(&mut self, known: &Self) {
         (self.spot, self.half) = (known.spot, known.half);
     }
 
-    /// Which way to turn to the target from `heading`: the short way.
+    /// Which way to turn from `heading` to the target: the short way.
     fn spin(&self, heading: Heading) -> Spin {
         match heading.quarters_right_to(self.target) {
             1 => Spin::Right,
@@ -77,12 +77,12 @@ impl Turn {
         }
     }
 
-    /// Degrees turned in the direction of the quarter at hand.
+    /// How many degrees the robot has turned in the direction of the present quarter.
     fn angle(&self, senses: &Senses, heading: Heading) -> f32 {
         senses.odometer.turned_deg * self.spin(heading).sign()
     }
 
-    fn judged(&mut self, turned: Turned, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn judged(&mut self, turned: Turned, helm: &mut Helm<'_>) -> Option<Ending> {
         let Turned::Quarters(quarters) = turned else {
             return self.begin_again(helm);
         };
@@ -100,20 +100,20 @@ impl Turn {
             senses.odometer.travelled_mm = length_mm - senses.odometer.travelled_mm;
         }
         Some(if self.disturbed {
-            Outcome::Interrupted
-        } else if matches!(self.spot, Spot::Edge(_)) && sees_no_tape(senses) {
-            Outcome::Missed
+            Ending::Interrupted
+        } else if matches!(self.spot, Spot::EdgeMarks(_)) && sees_no_tape(senses) {
+            Ending::Missed
         } else {
-            Outcome::Done
+            Ending::Done
         })
     }
 
-    fn begin_again(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn begin_again(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         self.tries += 1;
         let (most, tries) = (helm.config.tries, self.tries);
         if tries > most {
             let (most, tries) = (f32::from(most), f32::from(tries));
-            return Some(Outcome::Failed(FailureKind::BoardRefuses, most, tries));
+            return Some(Ending::Failed(FailureKind::BoardRefuses, most, tries));
         }
         helm.order.give_anew();
         None
@@ -126,14 +126,14 @@ impl Behaviour for Turn {
         odometer.turned_deg = 0.0;
         match self.spot {
             Spot::Node => odometer.travelled_mm = 0.0,
-            Spot::Edge(at_mm) => odometer.travelled_mm = at_mm,
+            Spot::EdgeMarks(at_mm) => odometer.travelled_mm = at_mm,
             Spot::Along(_) => {}
         }
         helm.senses.marks.clear();
         helm.order.give_anew();
     }
 
-    /// The order for the quarter at hand; none while it stands to be judged.
+    /// The order for the present quarter; `None` while the robot stands to be judged.
     fn wanted(&self, _: &Senses, heading: Heading, _: &LogicConfig) -> Command {
         if self.pause != Pause::None {
             return STANDBY;
@@ -145,7 +145,7 @@ impl Behaviour for Turn {
     }
 
     /// The order for the quarter has ended.
-    fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Ending> {
         match finish {
             Finish::None => None,
             Finish::Aborted | Finish::Refused | Finish::NoWord | Finish::NoTape => {
@@ -165,8 +165,8 @@ impl Behaviour for Turn {
         }
     }
 
-    /// Judges a turn that was cut short once the robot has stood for a moment.
-    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    /// Judges a turn that was cut short, once the robot has stood for a moment.
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
         if !self
             .pause
             .is_over(helm.now, helm.config.settle, helm.active)

@@ -1,9 +1,9 @@
-//! From an order to its delivery: what is taken on, what happens at the goods, and the way from
-//! there.
+//! From an order to its delivery: which orders the robot accepts, its work at the goods, and the
+//! way from there.
 
+use lager_orders::Pick;
 use lager_topics::{
-    EventKind, Failure, FailureKind, Goal, GoneWhy, Order, OrderQueue, Phase, Pick, Thought,
-    ThoughtKind,
+    EventKind, Failure, FailureKind, Goal, GoneWhy, Order, OrderQueue, Phase, Thought, ThoughtKind,
 };
 
 use super::{Mission, Tables};
@@ -46,22 +46,22 @@ impl Mission {
         }
     }
 
-    /// Whether an order for this product waits or is under way. There is one piece of goods for
-    /// each, so a second order would be in vain.
+    /// Whether an order for this product waits or is under way. There is one piece of each product,
+    /// so a second order would be in vain.
     fn is_ordered(&self, product: i32) -> bool {
         let mut waiting = self.queue.waiting().iter();
         self.is_under_way(self.order.id) && self.order.product == product
             || waiting.any(|waiting| waiting.order.product == product)
     }
 
-    /// The goods of the order under way are not in their place from now on.
+    /// The goods of the present order are not in their place from now on.
     pub(super) fn goods_are_gone(&mut self, why: GoneWhy, out: &mut Output) {
         self.gone.add(self.order.product, why, self.now);
         out.queue_changed = true;
     }
 
-    /// It is told that these goods are not in their place. What is ordered of them is refused,
-    /// unless the robot is on its way already: it sees for itself.
+    /// Somebody says that these goods are not in their place. Waiting orders for them are refused.
+    /// If the robot is on its way already, it goes on and sees for itself.
     pub(crate) fn miss_goods(&mut self, product: i32, out: &mut Output) {
         self.gone.add(product, GoneWhy::Told, self.now);
         out.queue_changed = true;
@@ -74,7 +74,7 @@ impl Mission {
         }
     }
 
-    /// A person says that goods are in their place again: those of one product, or all.
+    /// A person says that goods are in their place again: one product's, or all.
     pub(crate) fn find_goods(&mut self, product: Option<i32>, out: &mut Output) {
         let were_gone = match product {
             Some(product) => self.gone.remove(product),
@@ -88,7 +88,7 @@ impl Mission {
         }
     }
 
-    /// A person takes a waiting order back.
+    /// A person cancels a waiting order.
     pub(crate) fn cancel(&mut self, id: u32, out: &mut Output) {
         if let Some(order) = self.queue.cancel(id) {
             out.queue_changed = true;
@@ -103,9 +103,9 @@ impl Mission {
         is_at_work && self.order.id == id
     }
 
-    /// A person takes the order under way back, whose goods the robot does not hold. It ends what
-    /// it is about, and goes home from the next place where it decides, or on the next order.
-    /// Whether another manoeuvre begins at once.
+    /// A person cancels the present order before the robot holds its goods. The robot finishes its
+    /// manoeuvre. Then, where it decides next, it goes home or begins the next order. Returns
+    /// whether another manoeuvre begins at once.
     pub(crate) fn cancel_under_way(&mut self, out: &mut Output) -> bool {
         think_of_product(ThoughtKind::OrderCancelled, self.order.product, out);
         out.queue_changed = true;
@@ -124,12 +124,12 @@ impl Mission {
         true
     }
 
-    /// Too late to take the order under way back.
+    /// It is too late to cancel the present order.
     pub(crate) fn keep_order(&self, out: &mut Output) {
         think_of_product(ThoughtKind::OrderKept, self.order.product, out);
     }
 
-    /// A person wants a waiting order to be carried out earlier.
+    /// A person wants a waiting order earlier.
     pub(crate) fn move_up(&mut self, id: u32, out: &mut Output) {
         if self.queue.move_up(id) {
             out.queue_changed = true;
@@ -138,7 +138,7 @@ impl Mission {
         }
     }
 
-    /// A person takes all waiting orders back.
+    /// A person cancels all waiting orders.
     pub(crate) fn clear_queue(&mut self, out: &mut Output) {
         if self.queue.clear() {
             out.queue_changed = true;
@@ -147,14 +147,14 @@ impl Mission {
         }
     }
 
-    /// A robot that waited at home for a way to an order, and has no order left, waits no more.
+    /// If a robot waits at home for a way to an order, and has no order left, it stops waiting.
     fn need_no_way(&mut self) {
         if self.phase == Phase::WaitingForOrder && self.queue.waiting().is_empty() {
             self.failure = Failure::default();
         }
     }
 
-    /// The orders as they are published.
+    /// The orders in their published form.
     pub(crate) fn order_queue(&self) -> OrderQueue {
         let is_under_way = self.is_under_way(self.order.id);
         let mut queue = self.queue.to_payload(is_under_way.then_some(self.order));
@@ -162,13 +162,13 @@ impl Mission {
         queue
     }
 
-    /// As a predecessor published them.
+    /// Takes the orders that an earlier navigator published.
     pub(crate) fn restore_queue(&mut self, queue: &OrderQueue) {
         self.queue = Queue::from_payload(queue, self.order);
         self.gone = Gone::from_payload(queue);
     }
 
-    /// The map is another one: goods that it has elsewhere are there.
+    /// The map is another one: goods with another place on it are there again.
     pub(super) fn follow_goods(&mut self, before: &Map, out: &mut Output) {
         if let Some(map) = &self.map {
             out.queue_changed |= self.gone.follow(before, map);
@@ -199,8 +199,8 @@ impl Mission {
         });
     }
 
-    /// Begins the first of the waiting orders that can be reached from the node it stands on. Those
-    /// before it are put off; where none can be reached, it stands until the ways are others.
+    /// Begins the first waiting order that it can reach from the node where it stands. Orders
+    /// before it wait on. If it can reach none, it stands until a way opens.
     pub(crate) fn begin_next(&mut self, out: &mut Output) -> bool {
         if self.queue.waiting().is_empty() || self.must_park() {
             return false;
@@ -215,7 +215,7 @@ impl Mission {
             return self.begin_order(index, out);
         }
         if self.tables.blocks.is_empty() {
-            // No way will open: the floor has none, or the product no place on it.
+            // No way can open: the floor has none, or the product has no place on it.
             if let Some(order) = self.queue.take(0) {
                 out.queue_changed = true;
                 self.refuse(&order, FailureKind::NoWay, out);
@@ -230,8 +230,8 @@ impl Mission {
         false
     }
 
-    /// The order under way cannot be reached now: it waits, and another one that can be reached is
-    /// begun. Whether there is one.
+    /// The robot cannot reach the present order's goods now. That order waits, and another one
+    /// begins if the robot can reach it. Returns whether there is one.
     pub(super) fn put_off(&mut self, out: &mut Output) -> bool {
         if self.goal != Goal::Product {
             return false;
@@ -246,8 +246,8 @@ impl Mission {
         true
     }
 
-    /// The robot stands for want of a way to its goal, and one of the waiting orders can be reached
-    /// instead. Whether it begins that one.
+    /// The robot stands because there is no way to its goal, but it can reach a waiting order's
+    /// goods. Returns whether it begins that order.
     pub(crate) fn overtake(&mut self, out: &mut Output) -> bool {
         let stands = self.phase == Phase::Stuck && self.waits_for_way() && !self.must_park();
         let now = (self.tables.blocks.revision(), self.queue.revision());
@@ -258,8 +258,8 @@ impl Mission {
         self.put_off(out) || self.begin_on_the_way_home(out)
     }
 
-    /// Begins a waiting order from where it stands instead of going home first. Whether there is
-    /// one that can be reached.
+    /// Begins a waiting order from here, without going home first. Returns whether it can reach
+    /// one.
     pub(super) fn begin_on_the_way_home(&mut self, out: &mut Output) -> bool {
         if self.goal != Goal::Home {
             return false;
@@ -276,16 +276,16 @@ impl Mission {
         self.queue.waiting().iter().position(|waiting| {
             let station = map.station(waiting.order.product);
             station.is_some_and(|station| {
-                let [end, _] = station.ends;
-                let along = station.heading_from(end);
-                distances.search(map, blocks, station.ends);
+                let end = station.edge.from;
+                let along = station.edge.heading_from(end);
+                distances.search(map, blocks, station.edge.ends());
                 along.is_some_and(|along| blocks.is_open(map, end, along))
                     && distances.from(map, node).is_some()
             })
         })
     }
 
-    /// The turn of the first `count` waiting orders has come, and there is no way.
+    /// It is the turn of the first `count` waiting orders, and there is no way to them.
     fn queue_off(&mut self, count: usize, out: &mut Output) {
         if self.queue.put_off(count) {
             out.queue_changed = true;
@@ -295,7 +295,8 @@ impl Mission {
         }
     }
 
-    /// Begins a waiting order from the node it stands on. Whether there is one at that place.
+    /// Begins a waiting order from the node where it stands. Returns whether there is one at that
+    /// place.
     fn begin_order(&mut self, index: usize, out: &mut Output) -> bool {
         let Some(order) = self.queue.take(index) else {
             return false;
@@ -322,7 +323,7 @@ impl Mission {
     pub(super) fn be_in_position(&mut self, out: &mut Output) {
         self.phase = Phase::Picking;
         if self.goal == Goal::Home {
-            // The order was taken back meanwhile.
+            // Somebody has cancelled the order meanwhile.
             self.leave(false, out);
             return;
         }
@@ -339,7 +340,7 @@ impl Mission {
         self.wait_for_hand(kind, 0, self.tries.into(), out);
     }
 
-    /// The robot stands where it is and cannot go on without a hand.
+    /// The robot stands where it is and needs a person's hand.
     pub(super) fn wait_for_hand(
         &mut self,
         kind: FailureKind,
@@ -352,8 +353,8 @@ impl Mission {
         self.tell_failure(out);
     }
 
-    /// The operator says that the goods are in the claw. Goods that are not felt (`empty`) are
-    /// believed only if the operator insists. Whether the robot leaves.
+    /// The operator says that the goods are in the claw. If the claw does not feel them (`empty`),
+    /// the operator must insist. Returns whether the robot leaves.
     pub(crate) fn picked(
         &mut self,
         order_id: u32,
@@ -378,17 +379,19 @@ impl Mission {
         self.leave(forced, out)
     }
 
-    /// Leaves with the goods, or without them if the order was taken back: back onto the edge,
-    /// towards the end from which the delivery corner is nearer. Whether that changes anything.
+    /// Leaves with the goods, or without them if the order was cancelled. It drives back onto the
+    /// edge, towards the end that is nearer to the delivery corner. Returns whether that changes
+    /// anything.
     pub(super) fn leave(&mut self, forced: bool, out: &mut Output) -> bool {
         let (Some(map), Some(station)) = (&self.map, self.station()) else {
             return false;
         };
         let station = *station;
         let Tables { blocks, distances } = &mut *self.tables;
-        distances.search(map, blocks, [map.delivery(); 2]);
+        distances.search(map, blocks, [map.grid.delivery(); 2]);
         let best = station
-            .ends
+            .edge
+            .ends()
             .into_iter()
             .filter_map(|end| Some((distances.from(map, end)?, end)))
             .min_by_key(|(edges, _)| *edges);
@@ -397,8 +400,8 @@ impl Mission {
             self.wait_for_way(self.no_way(), out);
             return true;
         };
-        let from = station.other_end(towards).unwrap_or(towards);
-        let Some(heading) = station.heading_from(from) else {
+        let from = station.edge.other_end(towards).unwrap_or(towards);
+        let Some(heading) = station.edge.heading_from(from) else {
             return false;
         };
         self.place.node = from;

@@ -1,21 +1,20 @@
-//! Where the robot stands on its map, which ways are open, and the route from here to the goal.
+//! Where the robot is on its map, which ways are open, and the route from here to the goal.
 
+use lager_floor::{Heading, Node};
 use lager_topics::{
-    BlockSource, BlockedWays, EventKind, Failure, FailureKind, Goal, Heading, Phase, Route,
-    RouteNode, Thought, ThoughtKind, WarehouseMap,
+    BlockSource, BlockedWays, EventKind, Failure, FailureKind, Goal, Phase, Route, RouteNode,
+    Thought, ThoughtKind, WarehouseMap,
 };
 
 use super::{Mission, Tables};
+use crate::belief::Belief;
 use crate::blocks::{Block, Blocks};
-use crate::heading::Compass;
+use crate::ending::Ending;
 use crate::map::{Map, PickStation};
-use crate::node::Node;
-use crate::outcome::Outcome;
 use crate::output::Output;
-use crate::place::Place;
 
 impl Mission {
-    /// Takes a published map. Whether the robot stands anew, at the start.
+    /// Takes a published map. Returns whether the robot stands at the start again.
     pub(crate) fn take_map(&mut self, published: &WarehouseMap, out: &mut Output) -> bool {
         if self.published == *published {
             return false;
@@ -45,7 +44,7 @@ impl Mission {
         let same_floor = map.same_floor(known);
         if !(idle || same_floor && same_station) {
             out.think(ThoughtKind::MapKept);
-            // If it is sent again it is judged again.
+            // If the same map comes again, it is checked again.
             self.published = WarehouseMap::default();
             return false;
         }
@@ -67,14 +66,14 @@ impl Mission {
         false
     }
 
-    /// The first map of this process: a fresh robot stands at the start, one that was restarted
-    /// stands where it was.
+    /// The first map of this process: a new robot stands at the start, a restarted one where it
+    /// was.
     pub(super) fn take_first_map(&mut self, map: Map, out: &mut Output) -> bool {
         let is_at_station = matches!(self.phase, Phase::Positioning | Phase::Picking);
         let needs_station = self.goal == Goal::Product || is_at_station;
         let station_is_missing = needs_station && map.station(self.order.product).is_none();
-        let place_is_missing = !map.contains(self.place.node) || station_is_missing;
-        if self.blocked_floor != [0; 2] && self.blocked_floor != map.size() {
+        let place_is_missing = !map.grid.contains(self.place.node) || station_is_missing;
+        if self.blocked_floor != Node::default() && self.blocked_floor != map.grid.size() {
             self.tables.blocks.clear();
         }
         self.map = Some(map);
@@ -96,14 +95,14 @@ impl Mission {
     /// On the delivery node, looking into the warehouse (AMB-50).
     pub(super) fn stand_at_start(&mut self) {
         if let Some(map) = &self.map {
-            let (node, heading) = (map.delivery(), map.exit().back());
+            let (node, heading) = (map.grid.delivery(), map.grid.exit().back());
             self.stand_at(node, heading);
         }
     }
 
-    /// On a node, waiting for an order, with nothing left of what was before.
+    /// The robot is on a node and waits for an order; everything from before is forgotten.
     pub(super) fn stand_at(&mut self, node: Node, heading: Heading) {
-        self.place = Place::at(node, heading);
+        self.place = Belief::at(node, heading);
         self.target = heading;
         self.phase = Phase::WaitingForOrder;
         self.goal = Goal::None;
@@ -114,11 +113,11 @@ impl Mission {
         self.battery.accept();
     }
 
-    /// A person has put the robot down, on the delivery node if no `place` is told. Whether the
-    /// robot believes it.
+    /// A person has put the robot down, on the delivery node if there is no `place`. Returns
+    /// whether the robot believes it.
     pub(crate) fn put_down(&mut self, place: Option<(Node, Heading)>, out: &mut Output) -> bool {
         if let Some((node, _)) = place
-            && !self.map.as_ref().is_some_and(|map| map.contains(node))
+            && !self.map.as_ref().is_some_and(|map| map.grid.contains(node))
         {
             out.think_of(ThoughtKind::NoSuchNode, node);
             return false;
@@ -143,7 +142,7 @@ impl Mission {
         true
     }
 
-    /// A way is blocked or open now. Returns whether a robot that had no way can go on.
+    /// A way is blocked or open now. Returns whether a robot without a way can go on.
     pub(crate) fn take_way(&mut self, block: Block, open: bool, out: &mut Output) -> bool {
         let Some(map) = &self.map else { return false };
         let Block { node, heading, .. } = block;
@@ -169,7 +168,8 @@ impl Mission {
         self.find_way(out)
     }
 
-    /// Goes on if the robot stands for want of a way and there is one now. Whether it does.
+    /// Goes on if the robot stands because it had no way, and there is one now. Returns whether it
+    /// does.
     pub(super) fn find_way(&mut self, out: &mut Output) -> bool {
         let waits = self.waits_for_way();
         if waits && self.phase == Phase::Picking {
@@ -183,17 +183,17 @@ impl Mission {
         true
     }
 
-    /// Sets out from the node at which it has stood for want of a way.
+    /// Sets out from the node where it stood because it had no way.
     pub(super) fn go_on_for_a_way(&mut self, out: &mut Output) {
         self.failure = Failure::default();
-        // Where it is to stand at the node all the same, it is not stuck there.
+        // If it must stand at the node for another reason, it is not stuck there.
         self.phase = Phase::Driving;
         self.set_out(out);
     }
 
     /// Something stands on the way ahead.
     pub(super) fn block_ahead(&mut self, out: &mut Output) {
-        let Place { node, heading, .. } = self.place;
+        let Belief { node, heading, .. } = self.place;
         let block = Block {
             node,
             heading,
@@ -208,17 +208,17 @@ impl Mission {
     }
 
     /// It has turned round between two nodes and goes back to the one it came from.
-    pub(super) fn go_back(&mut self, outcome: Outcome, out: &mut Output) {
-        let Place { node, heading, .. } = self.place;
+    pub(super) fn go_back(&mut self, outcome: Ending, out: &mut Output) {
+        let Belief { node, heading, .. } = self.place;
         if let Some(map) = &self.map {
-            self.place.node = map.neighbour(node, heading.back()).unwrap_or(node);
+            self.place.node = map.grid.neighbour(node, heading.back()).unwrap_or(node);
         }
         self.doubt_turn(outcome, true, out);
         self.phase = Phase::Driving;
         self.plan_from_edge(node, heading, out);
     }
 
-    /// Whether it stands for want of a way.
+    /// Whether it stands because it has no way.
     pub(super) fn waits_for_way(&self) -> bool {
         matches!(
             self.failure.kind.get(),
@@ -234,7 +234,7 @@ impl Mission {
         }
     }
 
-    /// Forgets what it has seen on the ways long ago.
+    /// Forgets blocks that it has seen long ago.
     pub(super) fn forget_old_blocks(&mut self, out: &mut Output) {
         let long_ago = self.now.checked_sub(self.config.try_again);
         if long_ago.is_some_and(|until| self.tables.blocks.open_sensed(until)) {
@@ -242,8 +242,8 @@ impl Mission {
         }
     }
 
-    /// Tries the ways again that it has found blocked, if it stands because it has no way and found
-    /// the last block long ago. Returns whether it goes on.
+    /// Tries blocked ways again, if it stands because it has no way and found the last block long
+    /// ago. Returns whether it goes on.
     pub(crate) fn try_again(&mut self, out: &mut Output) -> bool {
         if !matches!(self.phase, Phase::Stuck | Phase::Picking) || !self.waits_for_way() {
             return false;
@@ -259,26 +259,27 @@ impl Mission {
         self.find_way(out)
     }
 
-    /// The ways on which something stands, as they are published.
+    /// The blocked ways in their published form.
     pub(crate) fn blocked_ways(&self) -> BlockedWays {
-        let [width, height] = self.map.as_ref().map_or(self.blocked_floor, Map::size);
+        let map = self.map.as_ref();
+        let floor = map.map_or(self.blocked_floor, |map| map.grid.size());
         BlockedWays {
-            width,
-            height,
+            width: floor.x,
+            height: floor.y,
             tries: self.tries,
             ..self.tables.blocks.to_payload()
         }
     }
 
-    /// As a predecessor published them.
+    /// Takes the blocked ways that an earlier navigator published.
     pub(crate) fn restore_blocks(&mut self, ways: &BlockedWays) {
         self.tables.blocks = Blocks::from_payload(ways);
-        self.blocked_floor = [ways.width, ways.height];
+        self.blocked_floor = Node::new(ways.width, ways.height);
         self.tries = ways.tries;
     }
 
-    /// Publishes the route of a robot between two nodes that drives along `heading` to the node
-    /// `towards` first.
+    /// Publishes the route of a robot between two nodes that first drives along `heading` to the
+    /// node `towards`.
     pub(super) fn plan_from_edge(&mut self, towards: Node, heading: Heading, out: &mut Output) {
         let Some(map) = &self.map else { return };
         let Some(goals) = self.goals() else { return };
@@ -298,9 +299,10 @@ impl Mission {
 
     /// Whether nothing stands on the edge of a station.
     pub(super) fn is_open(&self, station: &PickStation) -> bool {
-        let [node, _] = station.ends;
+        let node = station.edge.from;
         self.map.as_ref().is_some_and(|map| {
             station
+                .edge
                 .heading_from(node)
                 .is_some_and(|heading| self.tables.blocks.is_open(map, node, heading))
         })
@@ -308,34 +310,33 @@ impl Mission {
 
     /// Whether the way straight on behind the delivery corner is open.
     pub(super) fn may_go_past_corner(&self) -> bool {
-        let Place { node, heading, .. } = self.place;
+        let Belief { node, heading, .. } = self.place;
         let blocks = &self.tables.blocks;
         let is_open = |map: &Map| map.has_tape(node, heading) && blocks.is_open(map, node, heading);
         self.map.as_ref().is_some_and(is_open)
     }
 
-    /// The nodes of which the robot must reach one, if it has a goal that can be reached at all.
+    /// The nodes of which the robot must reach one, if it has a goal that it can reach at all.
     fn goals(&self) -> Option<[Node; 2]> {
         let map = self.map.as_ref()?;
         match self.goal {
             Goal::Product => self
                 .station()
                 .filter(|at| self.is_open(at))
-                .map(|at| at.ends),
-            Goal::Delivery | Goal::Home => Some([map.delivery(); 2]),
+                .map(|at| at.edge.ends()),
+            Goal::Delivery | Goal::Home => Some([map.grid.delivery(); 2]),
             Goal::None => None,
         }
     }
 
-    /// Plans from the node last passed to the goal, publishes the route and returns where it
-    /// begins.
+    /// Plans from the last node to the goal, publishes the route, and returns its first heading.
     pub(super) fn plan(&mut self, out: &mut Output) -> Option<Heading> {
         let Some(goals) = self.goals() else {
             self.set_route(Route::default(), out);
             return None;
         };
         let map = self.map.as_ref()?;
-        let Place { node, heading, .. } = self.place;
+        let Belief { node, heading, .. } = self.place;
         let Tables { blocks, distances } = &mut *self.tables;
         distances.search(map, blocks, goals);
         let next = distances.next(map, node, heading);

@@ -1,15 +1,16 @@
-//! What the steering board reports: how the order in force fares, what the wheels did, the arm and
-//! the battery.
+//! The steering board's reports: the state of the order in force, how far the wheels turned, the
+//! arm and the battery.
 
 use core::time::Duration;
 
-use lager_topics::{FailureKind, Goal, Mode, Phase, SteeringReport, Thought, ThoughtKind};
+use lager_orders::Mode;
+use lager_topics::{FailureKind, Goal, Phase, SteeringReport, Thought, ThoughtKind};
 
 use super::Navigator;
 use crate::battery::Limits;
-use crate::command::News;
+use crate::command::Progress;
+use crate::ending::Ending;
 use crate::manoeuvre::{Behaviour, STANDBY};
-use crate::outcome::Outcome;
 use crate::output::Output;
 
 impl Navigator {
@@ -29,18 +30,18 @@ impl Navigator {
             self.config.unheard_setpoint
         };
         match self.command.news(now, report, patience) {
-            News::None => {}
-            News::AtWork => self.in_vain = 0,
-            News::Ended(finish) if one_shot => {
+            Progress::None => {}
+            Progress::AtWork => self.in_vain = 0,
+            Progress::Ended(finish) if one_shot => {
                 let outcome = self.steer(now, out, |manoeuvre, helm| manoeuvre.ended(finish, helm));
                 if let Some(outcome) = outcome {
                     self.conclude(now, outcome, out);
                 }
             }
-            News::Unheard if one_shot && self.active => self.manoeuvre.interrupt(),
+            Progress::Unheard if one_shot && self.active => self.manoeuvre.interrupt(),
             // A setpoint ends by a stop, a lapsed lease or a restarted board. It is given again,
             // but not faster than the bridge can answer.
-            News::Ended(_) | News::Unheard => {
+            Progress::Ended(_) | Progress::Unheard => {
                 let patience = self.config.unheard_setpoint;
                 if self.active && self.command.is_older_than(now, patience) {
                     self.give_setpoint_anew(now, out);
@@ -49,8 +50,8 @@ impl Navigator {
         }
     }
 
-    /// Gives the setpoint again, unless it has been given in vain too often. To stand, which may be
-    /// refused as well, needs nobody's consent.
+    /// Gives the setpoint again, unless it was given in vain too often. The command to stand may be
+    /// refused as well, but does not count.
     fn give_setpoint_anew(&mut self, now: Duration, out: &mut Output) {
         self.command.give_anew();
         if self.command.command() == STANDBY {
@@ -61,7 +62,7 @@ impl Navigator {
         if in_vain > most {
             self.in_vain = 0;
             let (most, in_vain) = (f32::from(most), f32::from(in_vain));
-            let refused = Outcome::Failed(FailureKind::BoardRefuses, most, in_vain);
+            let refused = Ending::Failed(FailureKind::BoardRefuses, most, in_vain);
             self.conclude(now, refused, out);
         }
     }
@@ -78,7 +79,7 @@ impl Navigator {
         self.watch_battery(now, report.battery_decivolts, out);
     }
 
-    /// Asks whether the arm is where goods are carried, whenever the robot stands with them.
+    /// Checks, whenever the robot stands with goods, whether the arm is in its carry pose.
     pub(super) fn watch_arm(&mut self, out: &mut Output) {
         let carries = self.mission.goal == Goal::Delivery
             && matches!(
@@ -91,7 +92,7 @@ impl Navigator {
                     | Phase::TurningBack
                     | Phase::Exiting
             );
-        // An order was taken back at the goods: the arm may still reach out over them.
+        // Somebody cancelled an order at the goods: the arm may still reach over them.
         let withdraws = self.mission.goal == Goal::Home
             && match self.mission.phase {
                 // It waits there for a way.
@@ -106,7 +107,7 @@ impl Navigator {
         }
     }
 
-    /// Believes the battery to be low, or charged, when it has been so for a while.
+    /// Takes the battery as low, or charged, when it has been so for a while.
     fn watch_battery(&mut self, now: Duration, decivolts: u8, out: &mut Output) {
         let limits = Limits {
             low: self.config.low_battery_decivolts,
@@ -127,7 +128,7 @@ impl Navigator {
         self.leave_park(now, out);
     }
 
-    /// Sets out again from the node at which it has stood, if nothing keeps it there any more.
+    /// Sets out again from the node where it stood, if nothing holds it there any more.
     pub(super) fn leave_park(&mut self, now: Duration, out: &mut Output) {
         if !self.mission.must_park() && core::mem::take(&mut self.mission.parked) {
             self.mission.set_out(out);

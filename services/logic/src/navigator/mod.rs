@@ -1,18 +1,18 @@
-//! The navigator: events in, one steering order and a few announcements out, time an argument.
+//! The navigator: takes events and the time, and returns one steering order and some announcements.
 //!
 //! ```text
-//!   Input --> Navigator::handle --> manoeuvre --Outcome--> mission
+//!   Input --> Navigator::handle --> manoeuvre --Ending--> mission
 //!                  |                    ^                     |
 //!                  |                    +---- the next one ---+
 //!                  +--> holding (standing all the same) --> the order in force
 //! ```
 //!
 //! It joins three things that do not know each other: the mission (what to do next), the manoeuvre
-//! (line, marks and way) and what keeps the robot standing all the same.
+//! (line, marks and way), and the reasons to stand all the same.
 //!
 //! The state is a handful of plain values. Nearly all of them are in the published status, because
 //! the process may be killed at any moment and its successor must finish the mission. The order in
-//! force follows from the state and is not itself state: [`Navigator::handle`] changes the state
+//! force follows from the state and is not state itself: [`Navigator::handle`] changes the state
 //! and then computes the order, once.
 //!
 //! **Invariant:** nothing here reads a clock, allocates, or knows of the bus.
@@ -20,13 +20,12 @@
 mod board;
 mod input;
 mod status;
-mod words;
+mod wishes;
 
 use core::time::Duration;
 
-use lager_topics::{
-    BlockedWays, Hold, Mode, OrderQueue, Phase, Route, SteeringOrder, Step, ThoughtKind,
-};
+use lager_orders::Mode;
+use lager_topics::{BlockedWays, Hold, OrderQueue, Phase, Route, SteeringOrder, Step, ThoughtKind};
 use lager_wire::{Command, LineState};
 
 pub use input::Input;
@@ -34,14 +33,14 @@ pub use input::Input;
 use crate::by_hand::ByHand;
 use crate::command::Standing;
 use crate::config::LogicConfig;
+use crate::ending::Ending;
 use crate::holding::Holding;
 use crate::manoeuvre::{Behaviour, Helm, Manoeuvre, STANDBY, Senses, Stand};
 use crate::marks::Sides;
 use crate::mission::Mission;
-use crate::outcome::Outcome;
 use crate::output::Output;
 
-/// How long a robot that has to look ahead waits for a distance before it says so.
+/// How long a robot that must look ahead waits for a distance before it reports that.
 const DISTANCE_LATE: Duration = Duration::from_secs(1);
 
 /// The navigator's whole state.
@@ -50,7 +49,7 @@ pub struct Navigator {
     config: LogicConfig,
     mode: Option<Mode>,
     stopped: bool,
-    /// It may drive (L1, L2), which follows from the mode, the stop and the map.
+    /// Whether it may drive (L1, L2); mode, stop and map decide that.
     active: bool,
 
     mission: Mission,
@@ -59,18 +58,18 @@ pub struct Navigator {
     holding: Holding,
     by_hand: ByHand,
     command: Standing,
-    /// How often the setpoint at hand has been given without being seen at work.
+    /// How often the present setpoint was given without being seen at work.
     in_vain: u8,
 
     frames: u64,
     /// When the last input came.
     now: Duration,
-    /// What was true after it.
+    /// The facts after the last input.
     steady: Steady,
 }
 
-/// The parts of the status that change with a frame, a report or a tick without a new manoeuvre:
-/// compared with their values after the input before.
+/// The parts of the status that change with a frame, a report or a tick without a new manoeuvre.
+/// They are compared with those after the previous input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Steady {
     order_id: u32,
@@ -112,7 +111,7 @@ impl Navigator {
         navigator
     }
 
-    /// Takes one input at `now` (robot time) and goes on as far as it allows.
+    /// Takes one input at `now` (robot time) and goes on as far as possible.
     pub fn handle(&mut self, now: Duration, input: Input<'_>) -> Output {
         let mut out = Output::default();
         self.now = now;
@@ -145,24 +144,23 @@ impl Navigator {
         out
     }
 
-    /// The order to renew, `None` while the navigator may not or cannot drive (L1, L2).
+    /// The order to renew; `None` while the navigator may not or cannot drive (L1, L2).
     pub fn current_order(&self) -> Option<SteeringOrder> {
         self.active.then(|| self.command.order())
     }
 
-    /// The nodes it means to pass, the next one first.
+    /// The nodes that it will pass, the next one first.
     pub fn route(&self) -> &Route {
         &self.mission.route
     }
 
-    /// The order under way and those that wait, as they are published: what a successor needs
-    /// beside the status.
+    /// The present order and the waiting ones, in their published form. A successor needs them
+    /// besides the status.
     pub fn queue(&self) -> OrderQueue {
         self.mission.order_queue()
     }
 
-    /// The ways on which something stands, as they are published: what a successor needs beside
-    /// the status.
+    /// The blocked ways, in their published form. A successor needs them besides the status.
     pub fn blocks(&self) -> BlockedWays {
         self.mission.blocked_ways()
     }
@@ -176,7 +174,7 @@ impl Navigator {
         }
     }
 
-    /// Takes anything but a line frame.
+    /// Takes any input but a line frame.
     fn take(&mut self, now: Duration, input: Input<'_>, out: &mut Output) {
         match input {
             Input::Line(_) | Input::Tick => {}
@@ -192,8 +190,8 @@ impl Navigator {
         }
     }
 
-    /// Takes a line frame. The mark under the sensors and the way of the axle are judged together.
-    fn line(&mut self, now: Duration, state: LineState, out: &mut Output) -> Option<Outcome> {
+    /// Takes a line frame. The mark under the sensors and the axle's way are judged together.
+    fn line(&mut self, now: Duration, state: LineState, out: &mut Output) -> Option<Ending> {
         self.frames = self.frames.wrapping_add(1);
         let seen_before = self.senses.sight.is_some();
         self.senses.see(now, state);
@@ -205,7 +203,7 @@ impl Navigator {
             return self.steer(now, out, Manoeuvre::go_on);
         }
         if self.mission.map.is_none() {
-            // A successor that has no map yet; the mark is judged when it has.
+            // This successor has no map yet; the mark is judged when it has one.
             self.senses.marks.hold(state);
             return self.steer(now, out, Manoeuvre::go_on);
         }
@@ -230,7 +228,7 @@ impl Navigator {
         }
     }
 
-    /// Where a disturbed turn has left a doubt, a mark may show that the robot is elsewhere.
+    /// If a disturbed turn has left a doubt, a mark may show that the robot is elsewhere.
     fn ask_mark(&mut self, sides: Sides, out: &mut Output) {
         let Mission { map, place, .. } = &mut self.mission;
         let sought = self.manoeuvre.line().and_then(|follow| follow.sought());
@@ -266,8 +264,8 @@ impl Navigator {
     }
 
     /// A manoeuvre that has ended leads to the next one.
-    fn conclude(&mut self, now: Duration, outcome: Outcome, out: &mut Output) {
-        if outcome != Outcome::Ready {
+    fn conclude(&mut self, now: Duration, outcome: Ending, out: &mut Output) {
+        if outcome != Ending::Ready {
             self.mission.next(outcome, out);
         }
         self.begin(now, out);
@@ -286,14 +284,14 @@ impl Navigator {
         });
     }
 
-    /// The manoeuvre of the mission's phase, not begun yet.
+    /// The manoeuvre of the mission's phase, before its beginning.
     fn chosen(&self) -> Manoeuvre {
         Manoeuvre::choose(&self.mission, &self.senses, &self.holding, &self.config)
     }
 
-    /// Goes on where the state allows it without a further input.
+    /// Goes on, if the state allows it without a further input.
     fn go_on(&mut self, now: Duration, out: &mut Output) {
-        // A drive ends, the way ahead is seen to be open, and the next drive begins: at once.
+        // A drive ends, the way ahead is open, and the next drive begins: all at once.
         for _ in 0..3 {
             let Some(outcome) = self.steer(now, out, Manoeuvre::go_on) else {
                 break;
@@ -333,13 +331,13 @@ impl Navigator {
         self.holding.blind |= blind;
     }
 
-    /// What the manoeuvre needs now, whatever keeps the robot standing.
+    /// The command that the manoeuvre needs now, whatever holds the robot.
     fn needed(&self) -> Command {
         self.manoeuvre
             .wanted(&self.senses, self.mission.place.heading, &self.config)
     }
 
-    /// The command that the state asks for, and whether the operator may move the arm.
+    /// The command that follows from the state, and whether the operator may move the arm.
     fn wanted(&self, hold: Hold) -> (Command, bool) {
         let command = match self.needed() {
             Command::Wheel(_) if hold != Hold::None => STANDBY,
@@ -351,12 +349,12 @@ impl Navigator {
         (command, waits_for_hand && !moves_arm)
     }
 
-    /// It stands at the goods, and a person is to pick them up.
+    /// Whether it stands at the goods and a person has to pick them up.
     fn waits_for_hand(&self) -> bool {
         self.mission.phase == Phase::Picking && matches!(self.manoeuvre, Manoeuvre::Stand(_))
     }
 
-    /// It has to look ahead, and no distances come.
+    /// Whether it must look ahead and no distances come.
     fn misses_distances(&self) -> bool {
         let is_late = |(heard, _)| self.now.saturating_sub(heard) > DISTANCE_LATE;
         matches!(self.manoeuvre, Manoeuvre::Look(_)) && self.senses.distance.is_none_or(is_late)
@@ -379,8 +377,8 @@ impl Navigator {
         }
     }
 
-    /// The orders may go out (again). A setpoint from before has ended by now. A turn or a drop
-    /// from before is given again only when the bridge has reported how it ended.
+    /// Orders may go out (again). An earlier setpoint has ended by now. An earlier turn or drop is
+    /// given again only when the bridge has reported its end.
     fn begin_to_speak(&mut self, now: Duration) {
         self.command.listen_from(now);
         self.in_vain = 0;

@@ -1,31 +1,29 @@
-//! The state on its way out to `nav/status`, and back into a navigator after a restart.
+//! Writes the state into `nav/status`, and reads it back into a navigator after a restart.
 //!
-//! What is not in the status is either told again by others (map, mode), or begins anew without
-//! harm (which line state was seen last, how long the robot has stood). A mark that ends before a
-//! successor has its map is judged when the map is there. The blocked ways and the waiting orders
-//! are published beside the status.
+//! The status does not have everything. Others tell some of it again (map, mode), and the rest may
+//! begin anew without harm (the last line state, how long the robot has stood). If a mark ends
+//! before a successor has its map, it is judged when the map comes. The blocked ways and the
+//! waiting orders are published besides the status.
 
-use lager_topics::{
-    BlockedWays, Hold, Joint, Mode, NavigatorStatus, Order, OrderQueue, Phase, Remedy,
-};
+use lager_orders::Mode;
+use lager_topics::{BlockedWays, Hold, Joint, NavigatorStatus, Order, OrderQueue, Phase, Remedy};
 use lager_wire::{Command, WheelCommand};
 
 use super::Navigator;
 use crate::battery::Battery;
+use crate::belief::{Belief, Doubt};
 use crate::by_hand::ByHand;
 use crate::command::Standing;
 use crate::config::LogicConfig;
-use crate::heading::Spin;
 use crate::manoeuvre::{Behaviour, STANDBY};
 use crate::marks::MarkReader;
-use crate::node::Node;
-use crate::place::{Doubt, Place};
+use lager_floor::{Node, Spin};
 
 impl Navigator {
-    /// The state as it is published.
+    /// The state in its published form.
     pub fn status(&self) -> NavigatorStatus {
         let (mission, senses) = (&self.mission, &self.senses);
-        let Place { node, heading, .. } = mission.place;
+        let Belief { node, heading, .. } = mission.place;
         let mut status = NavigatorStatus {
             frames: self.frames,
             order_id: mission.order.id,
@@ -65,7 +63,7 @@ impl Navigator {
         status
     }
 
-    /// The remedy: what would make a standing robot go on, if a person has to act.
+    /// The remedy: what makes a standing robot go on, if a person must act.
     fn remedy(&self) -> Remedy {
         let hold = self.steady.hold;
         match self.mission.failure.remedy.get() {
@@ -81,8 +79,8 @@ impl Navigator {
 
     /// Goes on from the last status of a navigator that was killed.
     ///
-    /// The robot moved on until the lease of its order ended; that way is added. A status that
-    /// makes no sense (a foreign writer's) counts as none: the robot may be anywhere.
+    /// The robot moved on until the lease of its order ended, so that distance is added. An
+    /// impossible status (from another program) counts as none: the robot may be anywhere.
     pub fn resume(
         config: LogicConfig,
         status: &NavigatorStatus,
@@ -99,9 +97,9 @@ impl Navigator {
         let mut navigator = Self::new(config);
         let node = Node::new(u8::try_from(status.x).ok()?, u8::try_from(status.y).ok()?);
         let mission = &mut navigator.mission;
-        mission.place = Place {
+        mission.place = Belief {
             doubt: Doubt::of(status),
-            ..Place::at(node, status.heading.get()?)
+            ..Belief::at(node, status.heading.get()?)
         };
         mission.phase = status.phase.get()?;
         mission.target = status.target.get()?;
@@ -119,10 +117,10 @@ impl Navigator {
             mission.battery = Battery::LOW;
         }
         mission.link_lost = status.hold == Hold::Link;
-        // At home it waits for its order as before.
+        // At home it waits for its order, as before.
         mission.parked = mission.must_park() && mission.phase != Phase::WaitingForOrder;
         if status.hold == Hold::Arm {
-            // The next report tells which joint it is, if it is one still.
+            // The next report shows which joint it is, if it is still one.
             navigator.holding.joint_off = Some(Joint::Base);
         }
         navigator.frames = status.frames;
@@ -145,7 +143,8 @@ impl Navigator {
             senses.marks.believe();
             navigator.reckon_outage(command);
         }
-        // A turn or drop whose order is out is read from the reports; else it begins anew.
+        // If the order of a turn or drop has left, the reports show its end. Otherwise it begins
+        // anew.
         if navigator.needed() != command {
             navigator.manoeuvre.interrupt();
         }
@@ -153,7 +152,7 @@ impl Navigator {
         Some(navigator)
     }
 
-    /// Adds what the robot moved under `command` after its navigator was killed.
+    /// Adds how far the robot moved under `command` after its navigator was killed.
     fn reckon_outage(&mut self, command: Command) {
         let seconds = self.config.outage.as_secs_f32();
         let way = self.config.cruise_mm_per_s * seconds;

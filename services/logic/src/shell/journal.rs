@@ -1,29 +1,31 @@
-//! The shell's journal, `nav/inputs`: what the navigator was told and when, with proofs of what it
-//! did. It is written after everything that went out because of an input.
+//! The shell's journal, `nav/inputs`: the navigator's inputs with their times, and proofs of its
+//! answers. The shell writes it after everything else has left.
 //!
-//! Entries are gathered and published in pieces, for observers only: an entry takes no allocation
-//! and no call of the system. A piece goes out when it is full, and at the latest at the end of the
-//! first turn 50 ms after its first entry. That much is not told if the process is killed.
+//! Entries are collected and published in pieces, only for observers; an entry costs no allocation
+//! and no system call. A piece goes out when it is full, or at the end of the first turn 50 ms
+//! after its first entry. If the process is killed, the entries since then are lost.
 
 use core::time::Duration;
 
-use lager_ports::{Bus, Clock, PortError, Publisher, SendError};
+use lager_home::Clock;
+use lager_ports::{Bus, PortError, Publisher, SendError};
 use lager_topics::{
-    NavInputs, Sent, SteeringReport, TextKind, Told, ToldInputs, ToldKind, WarehouseMap,
+    Beside, NavInputs, NavigatorInput, NavigatorInputKind, NavigatorInputs, Sent, TextKind,
+    WarehouseMap,
 };
 use serde::Serialize;
 
+use crate::entry::{self, Beginning};
 use crate::navigator::{Input, Navigator};
 use crate::output::Output;
-use crate::told::{self, Beginning};
 
 /// How long an entry may wait to be published, in real time.
 const FLUSH_NS: u64 = 50_000_000;
 
-/// Room for a map with products on every place, so that a new one takes no allocation.
+/// Room for a map with products on every place, so that a new map needs no allocation.
 const LONGEST_TEXT: usize = 16 << 10;
 
-/// How far the shell's publishers have come.
+/// The numbers of the shell's publishers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Places {
     pub(super) commands: Sent,
@@ -31,23 +33,23 @@ pub(super) struct Places {
     pub(super) events: Sent,
 }
 
-/// Writes down what the navigator is told.
+/// Writes the navigator's inputs down.
 pub(super) struct Journal {
     to: Publisher<NavInputs>,
-    piece: Box<ToldInputs>,
+    piece: Box<NavigatorInputs>,
     /// When the piece has to go out, by the stamps' clock.
     due_ns: u64,
     /// Number of the next entry.
     next: u64,
-    /// How far the publishers had come before the next entry.
+    /// The numbers of the publishers before the next entry.
     before: Places,
-    /// The map that was told last.
+    /// The last map that was written.
     map: Option<Box<WarehouseMap>>,
     text: Vec<u8>,
 }
 
 impl Journal {
-    /// Of a navigator that has begun like this.
+    /// The journal of a navigator with this beginning.
     pub(super) fn begin(
         bus: &Bus,
         beginning: &Beginning,
@@ -68,7 +70,7 @@ impl Journal {
         Ok(journal)
     }
 
-    /// Writes an input down that the navigator has handled, when all that follows from it is out.
+    /// Writes down an input that the navigator has handled, when all its consequences have left.
     pub(super) fn told(
         &mut self,
         now: Duration,
@@ -77,32 +79,27 @@ impl Journal {
         output: &Output,
         after: Places,
     ) -> Result<(), SendError> {
-        let mut entry = told::entry(now, input);
-        told::answer(&mut entry, navigator, output);
+        let (mut entry, beside) = entry::of_input(now, input);
+        entry::answer(&mut entry, navigator, output);
         let learnt = match *input {
             Input::Map(map) => self.learn(map),
             _ => Ok(()),
         };
-        let report = match *input {
-            Input::Steering(report) => Some(report),
-            _ => None,
-        };
-        let added = self.add(entry, report, after);
+        let added = self.add(entry, beside, after);
         learnt.and(added)
     }
 
-    /// Writes down that the order or the status went out again.
+    /// Writes down that the order or the status was sent again.
     pub(super) fn again(
         &mut self,
         now: Duration,
-        kind: ToldKind,
+        kind: NavigatorInputKind,
         after: Places,
     ) -> Result<(), SendError> {
-        let entry = told::again(now.as_nanos() as u64, kind);
-        self.add(entry, None, after)
+        self.add(entry::again(now, kind), Beside::Nothing, after)
     }
 
-    /// Publishes what has waited for long enough.
+    /// Publishes entries that have waited long enough.
     pub(super) fn keep_time(&mut self) -> Result<(), SendError> {
         match Clock::monotonic_ns() >= self.due_ns {
             true => self.end(),
@@ -110,7 +107,7 @@ impl Journal {
         }
     }
 
-    /// Publishes what waits.
+    /// Publishes the entries that wait.
     pub(super) fn end(&mut self) -> Result<(), SendError> {
         match self.piece.entries_used > 0 {
             true => self.publish(),
@@ -120,32 +117,24 @@ impl Journal {
 
     fn add(
         &mut self,
-        entry: Told,
-        report: Option<&SteeringReport>,
+        entry: NavigatorInput,
+        beside: Beside<'_>,
         after: Places,
     ) -> Result<(), SendError> {
         if self.piece.entries_used == 0 {
             self.due_ns = Clock::monotonic_ns() + FLUSH_NS;
             self.open();
         }
-        let piece = &mut *self.piece;
-        if let Some(report) = report {
-            piece.reports[usize::from(piece.reports_used)] = *report;
-            piece.reports_used += 1;
-        }
-        piece.entries[usize::from(piece.entries_used)] = entry;
-        piece.entries_used += 1;
+        self.piece.add(entry, beside);
         self.next += 1;
         self.before = after;
-        let is_full = piece.entries().len() == piece.entries.len()
-            || piece.reports().len() == piece.reports.len();
-        match is_full {
+        match self.piece.is_full() {
             true => self.publish(),
             false => Ok(()),
         }
     }
 
-    /// Says a map that the next entry means, unless it was the last one already.
+    /// Writes the map to which the next entry refers, unless it was the last one already.
     fn learn(&mut self, map: &WarehouseMap) -> Result<(), SendError> {
         if self.map.as_deref() == Some(map) {
             return Ok(());
@@ -178,13 +167,13 @@ impl Journal {
         }
         self.text = text;
         if sent.is_err() {
-            // A hole in the numbers: what follows means a text that is not there.
+            // Leave a gap in the numbers: the following entries refer to a text that is missing.
             self.next += 1;
         }
         sent
     }
 
-    /// Says in a blank piece where it stands.
+    /// Writes into a blank piece where it stands.
     fn open(&mut self) {
         let (piece, before) = (&mut *self.piece, self.before);
         piece.first = self.next;
@@ -197,7 +186,7 @@ impl Journal {
             *loan = *self.piece;
             loan.send_quietly()
         });
-        *self.piece = ToldInputs::default();
+        *self.piece = NavigatorInputs::default();
         sent
     }
 }

@@ -1,22 +1,19 @@
-//! A stand-in for everything below logic: a robot on the same grid, moved by the orders, and a
-//! bridge with leases. Geometry decides what the sensors see; the constants are the document's.
+//! A double of everything below logic: a robot on the same grid, moved by the orders, and a bridge
+//! with leases. Geometry decides what the sensors see; the constants are the document's.
 //!
-//! It is small on purpose: 5 ms steps, tape with sharp edges, wheels with lag and a wrong gain. It
-//! follows its line by the regulator of the steering board, and learns as that does how unlike its
-//! wheels are.
+//! It is small on purpose: steps of 5 ms, tape with sharp edges, wheels with lag and a wrong gain.
+//! It shares no code with the boards' programs. It follows its line by the regulator that the
+//! document gives for the steering board, and learns in the same way how unequal its wheels are.
 
 use std::time::Duration;
 
-use lager_control::pd::{Gains, Pd};
-use lager_control::sides::Sides;
-use lager_topics::{
-    Finish, Heading, Origin, SERVO_UNKNOWN, SteeringOrder, SteeringReport, WarehouseMap,
-};
+use lager_floor::Heading;
+use lager_topics::{Finish, Origin, SERVO_UNKNOWN, SteeringOrder, SteeringReport, WarehouseMap};
 use lager_wire::{ArmCommand, Command, LineState, SteerFlags, WheelCommand};
 
 use crate::floor::{Exit, Floor, Obstacle, Point};
 
-/// One step of the world.
+/// The time of one step of the world.
 pub(crate) const STEP: Duration = Duration::from_millis(5);
 const LEASE: Duration = Duration::from_millis(120);
 const QUARTER: Duration = Duration::from_millis(3000);
@@ -27,19 +24,19 @@ const CRUISE: f64 = 73.3;
 const TRACK: f64 = 280.0;
 const LAG: f64 = 0.06;
 
-/// The arm where it is carried, something in the claw.
+/// The servos' positions when the arm carries something.
 pub(crate) const CARRYING: [u16; 8] = [512, 600, 423, 400, 623, 512, 512, 399];
 
-/// What happens to a line frame on its way.
+/// The disturbances of a trial.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trouble {
-    /// Milliseconds between line frames.
+    /// The time between line frames, in ms.
     pub(crate) frame_ms: u64,
-    /// Frames lost, out of 1000.
+    /// The number of lost frames in 1000.
     pub(crate) lost: u64,
-    /// Frames that show something else, out of 1000.
+    /// The number of frames in 1000 that show a wrong state.
     pub(crate) noise: u64,
-    /// Wrong gain of the left and the right motor.
+    /// The wrong gains of the left and the right motor.
     pub(crate) gains: (f64, f64),
 }
 
@@ -52,14 +49,74 @@ impl Trouble {
     };
 }
 
-/// An order at work.
+/// How unequal the wheels are: the learnt correction on straight lines, in duty steps.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sides {
+    mean: f64,
+    /// The number of steps for which the robot has followed its line.
+    followed: u32,
+    /// The steps in which the line's end still belongs to the last tape across it; counts down.
+    since_bar: u32,
+    /// The robot has passed the bar and no mark since, so this line may be curved.
+    beside_grid: bool,
+    /// The correction in use: the mean at the last mark of the grid.
+    bias: f64,
+    /// The correction in use before that mark.
+    before: f64,
+}
+
+impl Sides {
+    fn observe(&mut self, correction: f64, state: LineState) {
+        let was_bar = self.since_bar > 0;
+        self.since_bar = match state {
+            LineState::FourWay => 30,
+            _ => self.since_bar.saturating_sub(1),
+        };
+        match state {
+            LineState::StationToLeft | LineState::StationToRight | LineState::FourWay => {
+                if self.beside_grid {
+                    self.beside_grid = false;
+                    self.pause();
+                } else if self.followed > 900 {
+                    self.before = self.bias;
+                    self.bias = self.mean;
+                    self.followed = 600;
+                }
+            }
+            // The last mark was not a crossing but the delivery's bar, perhaps left at an angle.
+            LineState::DropStation | LineState::NotOnLine
+                if was_bar || state == LineState::DropStation =>
+            {
+                if !self.beside_grid {
+                    self.bias = self.before;
+                }
+                self.beside_grid = true;
+            }
+            _ => {
+                self.followed += 1;
+                // In the first 3 s the robot still comes to the middle of its line.
+                if self.followed > 600 {
+                    self.mean += (correction.clamp(-12.0, 12.0) - self.mean) / 256.0;
+                }
+            }
+        }
+    }
+
+    /// For a time in which the robot does not follow a line.
+    fn pause(&mut self) {
+        self.mean = self.bias;
+        self.followed = 0;
+    }
+}
+
+/// An order that is carried out.
 #[derive(Clone, Copy, Debug)]
 struct Work {
     id: u32,
     command: Command,
     lease: Duration,
     since: Duration,
-    /// Turns: words in a row without tape under the centre.
+    /// For turns: the number of states in a row without tape under the centre.
     clear: u32,
 }
 
@@ -68,11 +125,11 @@ struct Work {
 pub(crate) struct Body {
     pub(crate) floor: Floor,
     pub(crate) trouble: Trouble,
-    /// What stands on the floor.
+    /// The things on the floor.
     pub(crate) obstacles: Vec<Obstacle>,
-    /// How far the ranger sees, in cm; none that is dead.
+    /// How far the ranger sees, in cm; `None` = it is dead.
     pub(crate) sees_cm: Option<u8>,
-    /// The body has run into one of them.
+    /// The body has run into a thing.
     pub(crate) touched: bool,
     random: u64,
     pub(crate) now: Duration,
@@ -85,38 +142,37 @@ pub(crate) struct Body {
     work: Option<Work>,
     finished: (u32, Finish),
     replaced: u32,
-    /// The last error, in half sensor steps, positive = the line is to the right.
+    /// The last error, in half sensor distances, positive = the line is to the right.
     error: i8,
-    pd: Pd,
+    /// The errors of the last two steps, the newer first.
+    past: [f64; 2],
     sides: Sides,
-    /// How the board rounds parts of a duty step now.
-    round: u8,
     after_bar: bool,
     pub(crate) autonomous: bool,
     pub(crate) stopped: bool,
-    /// The next one-shot orders to refuse.
+    /// How many of the next one-shot orders it refuses.
     pub(crate) refuse: u32,
-    /// Setpoints that turn the wheels are not carried out: the bridge says so, or nothing.
+    /// Setpoints that turn the wheels end with this finish at once; with `Finish::None`, silently.
     pub(crate) refuses_to_drive: Option<Finish>,
     /// The board's reports do not reach the bridge.
     pub(crate) silent: bool,
     /// Positions of the servos, and the load of the claw.
     pub(crate) servos: [u16; 8],
     pub(crate) claw_load: i16,
-    /// Servos that have not been heard since the board started.
+    /// The servos that have not reported since the board started.
     unheard: [bool; 8],
-    /// Lives of the link to the steering board.
+    /// The number of the link's life.
     life: u32,
     pub(crate) battery: u8,
-    /// Where the base has to aim for the claw to close on the goods.
+    /// The base's position at which the claw closes on the goods; `None` = there are none.
     pub(crate) goods_at: Option<u16>,
-    /// The claw has closed on them.
+    /// The claw holds the goods.
     holds: bool,
-    /// A duty the operator drives with in manual mode.
+    /// The duty with which the operator drives in manual mode.
     pub(crate) manual_duty: f64,
-    /// What the bridge has summed of it: duty × µs of both motors.
+    /// The bridge's sum of that: duty × µs of both motors.
     pub(crate) driven_by_hand: u64,
-    /// Turns and drops begun, by code.
+    /// The codes of the turns and drops that began.
     pub(crate) begun: Vec<u8>,
     pub(crate) frames_sent: u64,
 }
@@ -141,9 +197,8 @@ impl Body {
             finished: (0, Finish::None),
             replaced: 0,
             error: 0,
-            pd: Pd::new(Gains::default()),
-            sides: Sides::new(),
-            round: 0,
+            past: [0.0; 2],
+            sides: Sides::default(),
             after_bar: false,
             autonomous: true,
             stopped: false,
@@ -190,7 +245,7 @@ impl Body {
             order.id
         );
         if let Some(work) = self.work.take() {
-            // A turn is waited for, unless nobody can hear its end.
+            // Logic must wait for a turn's end, unless no report of the end can come.
             let given_up = self.silent && command == Command::Wheel(WheelCommand::Standby);
             assert!(
                 !work.command.is_one_shot() || given_up,
@@ -222,7 +277,7 @@ impl Body {
         });
     }
 
-    /// Ends the order at work.
+    /// Ends the order that is carried out.
     pub(crate) fn end_work(&mut self, finish: Finish) {
         if let Some(work) = self.work.take() {
             self.finished = (work.id, finish);
@@ -236,7 +291,7 @@ impl Body {
         })
     }
 
-    /// One step of 5 ms. Yields the line frame that reaches logic now, if one does.
+    /// Makes one step of 5 ms; returns the line frame that reaches logic now, if there is one.
     pub(crate) fn step(&mut self) -> Option<LineState> {
         self.now += STEP;
         let bits = self.bits();
@@ -312,17 +367,20 @@ impl Body {
         {
             self.end_work(Finish::Aborted);
         }
-        let now_us = self.now.as_micros() as u32;
-        self.round = self.round.wrapping_add(157);
         let is_mark = matches!(
             state,
             LineState::StationToLeft | LineState::StationToRight | LineState::FourWay
         );
-        let correction = match self.pd.update(self.error, now_us) {
-            _ if is_mark => 0,
-            correction => correction,
+        // The regulator: P, which counts twice under the outer sensors, and D over 10 ms.
+        let error = f64::from(self.error);
+        let beyond = error - error.clamp(-5.0, 5.0);
+        let correction = match is_mark {
+            true => 0.0,
+            false => 2.0 * (error + beyond) + 2.0 * (error - self.past[1]),
         };
-        let correction = correction + self.sides.bias(self.round);
+        self.past = [error, self.past[0]];
+        let bias = self.sides.bias;
+        let correction = correction + bias;
         let Some(work) = &mut self.work else {
             self.sides.pause();
             self.duties = (self.manual_duty, self.manual_duty);
@@ -333,12 +391,10 @@ impl Body {
         };
         match work.command {
             Command::Wheel(WheelCommand::ActiveForward) => {
-                self.sides.observe(correction, state, now_us);
+                self.sides.observe(correction, state);
             }
             _ => self.sides.pause(),
         }
-        let correction = f64::from(correction);
-        let bias = f64::from(self.sides.bias(self.round));
         let alike =
             |left: f64, right: f64| (left + bias * left.signum(), right - bias * right.signum());
         let age = self.now - work.since;
@@ -376,8 +432,8 @@ impl Body {
         };
     }
 
-    /// The steering board starts anew: what it did is cut short, and the arm sags. It hears of a
-    /// servo only when it moves it.
+    /// Restarts the steering board: its command is cut short, and the arm sags. The board knows a
+    /// servo's position again only when it moves the servo.
     pub(crate) fn restart_board(&mut self) {
         self.end_work(Finish::Aborted);
         self.life += 1;
@@ -386,7 +442,7 @@ impl Body {
         self.claw_load = 0;
     }
 
-    /// One step of the arm has been made.
+    /// Moves the arm by one step.
     fn move_arm(&mut self, step: ArmCommand) {
         let [base, shoulder, elbow, claw] = [0, 1, 3, 7];
         let moved = match step {
@@ -408,7 +464,7 @@ impl Body {
             ArmCommand::In => self.servos[elbow] -= 4,
             ArmCommand::Release => {
                 if self.holds && !at_the_goods {
-                    // They fall to the floor.
+                    // The goods fall to the floor.
                     self.goods_at = None;
                 }
                 self.holds = false;
@@ -440,7 +496,7 @@ impl Body {
         self.touched |= !self.obstacles.is_empty() && self.touches();
     }
 
-    /// A place in the robot's coordinates as one on the floor.
+    /// The point of the floor at this place in the robot's coordinates.
     fn point(&self, ahead: f64, right: f64) -> Point {
         let (sin, cos) = self.angle.to_radians().sin_cos();
         (
@@ -456,7 +512,7 @@ impl Body {
         self.obstacles.iter().any(|(low, high)| within(*low, *high))
     }
 
-    /// Whether the robot would touch something that stands so far around it.
+    /// Whether the body touches a thing.
     fn touches(&self) -> bool {
         [170.0, 30.0, -110.0]
             .into_iter()
@@ -464,7 +520,7 @@ impl Body {
             .any(|(ahead, right)| self.is_in_an_obstacle(self.point(ahead, right)))
     }
 
-    /// What the ranger says: cm to what is in front, 255 where nothing is in sight.
+    /// The ranger's value: cm to the thing ahead, 255 = nothing in sight.
     pub(crate) fn range_cm(&self) -> Option<u8> {
         let is_there =
             |cm: &u8| self.is_in_an_obstacle(self.point(100.0 + 10.0 * f64::from(*cm), 0.0));
@@ -503,12 +559,12 @@ impl Body {
         }
     }
 
-    /// How far the axle is from a place, in mm.
+    /// The distance from the axle to a point, in mm.
     pub(crate) fn distance_to(&self, (x, y): Point) -> f64 {
         (self.x - x).hypot(self.y - y)
     }
 
-    /// How far the robot looks from a heading, in degrees.
+    /// The angle between the robot and a heading, in degrees.
     pub(crate) fn degrees_off(&self, heading: Heading) -> f64 {
         let wanted = match heading {
             Heading::Right => 0.0,

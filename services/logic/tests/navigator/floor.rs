@@ -1,11 +1,12 @@
 //! The tape of a warehouse: grid, station marks, the way out and its cross bar, with sharp edges.
 
-use lager_topics::{Side, WarehouseMap};
+use lager_floor::Heading;
+use lager_topics::WarehouseMap;
 
 /// Half the width of the tape, in mm.
 const HALF_TAPE: f64 = 7.5;
 
-/// A place in mm.
+/// A point in mm.
 pub(crate) type Point = (f64, f64);
 
 /// Tape on the floor.
@@ -14,18 +15,18 @@ pub(crate) struct Floor {
     pub(crate) side: f64,
     columns: f64,
     rows: f64,
-    /// Station marks, the way out and its cross bar.
+    /// The station marks, the way out and its cross bar.
     strips: Vec<(Point, Point)>,
     /// Middle of the cross bar.
     pub(crate) bar: Point,
 }
 
-/// How the way out leads away from the warehouse.
+/// The form of the way out.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Exit {
-    /// Straight, in mm.
+    /// Straight, with this length in mm.
     Straight(f64),
-    /// Straight, then a quarter of a circle of this radius to the left, then straight.
+    /// Straight, then a quarter of a circle to the left, then straight; the radius is in mm.
     Curved(f64, f64),
 }
 
@@ -37,10 +38,10 @@ impl Floor {
             let (x, y) = (f64::from(product.x) * side, f64::from(product.y) * side);
             let half = side / 2.0;
             strips.push(match product.side.get().unwrap() {
-                Side::Left => ((x, y + half), (x + 170.0, y + half)),
-                Side::Up => ((x + half, y + side), (x + half, y + side - 170.0)),
-                Side::Right => ((x + side, y + half), (x + side - 170.0, y + half)),
-                Side::Down => ((x + half, y), (x + half, y + 170.0)),
+                Heading::Left => ((x, y + half), (x + 170.0, y + half)),
+                Heading::Up => ((x + half, y + side), (x + half, y + side - 170.0)),
+                Heading::Right => ((x + side, y + half), (x + side - 170.0, y + half)),
+                Heading::Down => ((x + half, y), (x + half, y + 170.0)),
             });
         }
         let mut at = (
@@ -100,8 +101,7 @@ impl Floor {
     }
 }
 
-/// A thing in the middle of the edge between two neighbouring nodes: its smallest and its largest
-/// coordinates.
+/// A thing on an edge: its smallest and its largest coordinates.
 pub(crate) type Obstacle = (Point, Point);
 
 impl Floor {

@@ -1,10 +1,12 @@
-//! Goods that are not in their place: who orders them is told so, and no robot drives to an empty
-//! shelf.
+//! Tests of goods that are not in their place: the robot refuses an order for them with the reason,
+//! and drives to no empty shelf.
 
 use std::time::Duration;
 
+use lager_floor::Heading;
 use lager_logic::{Input, LogicConfig};
-use lager_topics::{EventKind, FailureKind, GoneWhy, Phase, Pick, Side};
+use lager_orders::Pick;
+use lager_topics::{EventKind, FailureKind, GoneWhy, InputKind, Phase};
 
 use crate::double::Trouble;
 use crate::floor::Exit;
@@ -19,12 +21,12 @@ fn robot(pick: Pick) -> Trial {
         pick,
         ..LogicConfig::default()
     };
-    let products = [(0, 0, Side::Up), (0, 0, Side::Right)];
+    let products = [(0, 0, Heading::Up), (0, 0, Heading::Right)];
     let map = warehouse((1, 1), (0, 0), 45, &products);
     Trial::with(config, map, EXIT, Trouble::NONE, 3)
 }
 
-/// One that has just delivered product 1.
+/// A robot that has just delivered product 1.
 fn delivered() -> Trial {
     let mut trial = robot(Pick::Manual);
     trial.order(1, 1);
@@ -32,7 +34,7 @@ fn delivered() -> Trial {
     trial
 }
 
-/// The orders that were refused.
+/// The numbers of the refused orders.
 fn refused(trial: &Trial) -> Vec<u32> {
     let events = trial.events.iter();
     let refused = events.filter(|(kind, ..)| *kind == EventKind::Refused);
@@ -58,7 +60,7 @@ fn delivered_goods_are_not_fetched_again_until_they_are_back() {
         "{said}"
     );
     assert!(
-        said.contains("s ago; put it back and say `lager map back 1`"),
+        said.contains("s ago; put it back and say that it is there"),
         "{said}"
     );
     assert!(
@@ -66,15 +68,15 @@ fn delivered_goods_are_not_fetched_again_until_they_are_back() {
         "it is no failure of the robot's"
     );
 
-    trial.tell(Input::GoodsBack(Some(2)));
+    trial.press(InputKind::GoodsBack, 2);
     trial.order(3, 1);
     assert_eq!(refused(&trial), [2, 3], "others are back");
-    trial.tell(Input::GoodsBack(Some(1)));
+    trial.press(InputKind::GoodsBack, 1);
     assert_eq!(gone(&trial), []);
     trial.order(4, 1);
     trial.deliver(2);
     assert_eq!(refused(&trial), [2, 3]);
-    trial.tell(Input::GoodsBack(None));
+    trial.press(InputKind::GoodsBack, lager_topics::Input::ALL_GOODS);
     assert_eq!(gone(&trial), []);
 }
 
@@ -89,8 +91,8 @@ fn what_waits_or_is_under_way_is_not_ordered_twice() {
     assert_eq!(refused(&trial), [2, 4], "waiting");
     let said = trial.thoughts.last().unwrap();
     assert!(said.contains("product 2 is ordered already"), "{said}");
-    // Who has taken it back may order it again.
-    trial.tell(Input::Cancel(3));
+    // After a cancelled order the product can be ordered again.
+    trial.press(InputKind::OrderCancelled, 3);
     trial.order(5, 2);
     trial.deliver(2);
     assert_eq!(refused(&trial), [2, 4]);
@@ -106,7 +108,7 @@ fn goods_that_were_not_found_are_known_to_be_gone() {
     assert!(gave_up, "{}", trial.story());
     assert_eq!(gone(&trial), [(1, Some(GoneWhy::NotFound))]);
     trial.run_for(SECOND / 5);
-    trial.tell(Input::Cancel(1));
+    trial.press(InputKind::OrderCancelled, 1);
     trial.order(2, 1);
     assert_eq!(refused(&trial), [2], "{}", trial.story());
     trial.order(3, 2);
@@ -124,7 +126,7 @@ fn goods_in_the_claw_of_a_robot_that_is_put_down_are_not_looked_for_on_their_she
     trial.body.stopped = true;
     trial.tell_mode();
     trial.run_for(SECOND);
-    trial.tell(Input::Reset);
+    trial.press(InputKind::ResetPressed, 0);
     assert_eq!(refused(&trial), [1], "the order is given up");
     trial.order(2, 1);
     assert_eq!(refused(&trial), [1, 2]);
@@ -136,7 +138,7 @@ fn a_waiting_order_for_goods_that_are_told_to_be_gone_is_refused() {
     trial.order(1, 1);
     trial.order(2, 2);
     trial.run_for(SECOND);
-    trial.tell(Input::GoodsGone(2));
+    trial.press(InputKind::GoodsGone, 2);
     assert_eq!(refused(&trial), [2]);
     assert_eq!(trial.queue.orders().len(), 0);
     assert_eq!(gone(&trial), [(2, Some(GoneWhy::Told))]);
@@ -146,7 +148,7 @@ fn a_waiting_order_for_goods_that_are_told_to_be_gone_is_refused() {
 #[test]
 fn goods_that_a_person_has_put_elsewhere_on_the_map_are_there() {
     let mut trial = delivered();
-    let products = [(0, 0, Side::Left), (0, 0, Side::Right)];
+    let products = [(0, 0, Heading::Left), (0, 0, Heading::Right)];
     let map = warehouse((1, 1), (0, 0), 45, &products);
     trial.published = map;
     trial.body.floor = crate::floor::Floor::new(&map, EXIT);

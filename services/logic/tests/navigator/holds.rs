@@ -1,11 +1,11 @@
-//! What keeps a robot standing that would drive: a silent board, an arm that is not in the carry
-//! pose, an empty claw, a low battery, a lost link, an unknown place.
+//! Tests of the reasons for which a robot stands instead of driving: a silent board, an arm that is
+//! not in the carry pose, an empty claw, a low battery, a lost link, an unknown place.
 
 use std::time::Duration;
 
-use lager_logic::node::Node;
+use lager_floor::Heading;
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{EventKind, Heading, Hold, Phase, Remedy, Side};
+use lager_topics::{EventKind, Hold, InputKind, Phase, Remedy};
 
 use crate::double::{CARRYING, Trouble};
 use crate::floor::Exit;
@@ -15,7 +15,12 @@ const EXIT: Exit = Exit::Straight(450.0);
 const SECOND: Duration = Duration::from_secs(1);
 
 fn mission() -> Trial {
-    let map = warehouse((2, 1), (0, 0), 45, &[(1, 0, Side::Right), (0, 0, Side::Up)]);
+    let map = warehouse(
+        (2, 1),
+        (0, 0),
+        45,
+        &[(1, 0, Heading::Right), (0, 0, Heading::Up)],
+    );
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     trial.order(1, 1);
     trial
@@ -43,10 +48,14 @@ fn assert_stands(trial: &mut Trial, span: Duration) {
     assert!((trial.body.angle - angle).abs() < 0.1, "{}", trial.story());
 }
 
-/// The operator says again and again that the goods are in the claw.
+/// The operator presses repeatedly that the goods are in the claw.
 fn picked(trial: &mut Trial, forced: bool) {
     let order_id = trial.status.order_id;
-    trial.tell(Input::PickupDone { order_id, forced });
+    let kind = match forced {
+        true => InputKind::PickupForced,
+        false => InputKind::PickupDone,
+    };
+    trial.press(kind, order_id);
 }
 
 #[test]
@@ -100,7 +109,7 @@ fn a_mission_survives_a_silence_of_the_steering_board_at_any_moment() {
 
 #[test]
 fn who_was_restarted_and_knows_no_place_waits_for_a_reset() {
-    let map = warehouse((2, 1), (0, 0), 45, &[(1, 0, Side::Right)]);
+    let map = warehouse((2, 1), (0, 0), 45, &[(1, 0, Heading::Right)]);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     put(&mut trial, (1, 1), 90.0);
     trial.navigator = Navigator::lost(LogicConfig::default());
@@ -115,7 +124,7 @@ fn who_was_restarted_and_knows_no_place_waits_for_a_reset() {
     assert_stands(&mut trial, SECOND);
 
     put(&mut trial, (0, 0), 0.0);
-    trial.tell(Input::Reset);
+    trial.press(InputKind::ResetPressed, 0);
     trial.order(3, 1);
     trial.deliver(1);
 }
@@ -146,8 +155,7 @@ fn a_robot_put_on_any_node_in_manual_mode_delivers_from_there() {
             trial.run_for(SECOND);
             assert_eq!(trial.phase(), Phase::Stuck);
             put(&mut trial, (x, y), angle);
-            let node = Node::new(x, y);
-            trial.tell(Input::Placed { node, heading });
+            trial.press_at(InputKind::Placed, (x, y), heading);
             trial.body.autonomous = true;
             trial.tell_mode();
             trial.order(2, 2);
@@ -160,20 +168,13 @@ fn a_robot_put_on_any_node_in_manual_mode_delivers_from_there() {
 fn nobody_puts_a_driving_robot_down_nor_beside_the_map() {
     let mut trial = run_to(Phase::Approaching);
     trial.run_for(SECOND / 2);
-    trial.tell(Input::Reset);
-    let place = Input::Placed {
-        node: Node::new(0, 0),
-        heading: Heading::Up,
-    };
-    trial.tell(place);
+    trial.press(InputKind::ResetPressed, 0);
+    trial.press_at(InputKind::Placed, (0, 0), Heading::Up);
     assert_eq!(trial.phase(), Phase::Approaching);
     assert!(said(&trial, "nobody has put me down"), "{}", trial.story());
     trial.body.stopped = true;
     trial.tell_mode();
-    trial.tell(Input::Placed {
-        node: Node::new(7, 0),
-        heading: Heading::Up,
-    });
+    trial.press_at(InputKind::Placed, (7, 0), Heading::Up);
     assert!(said(&trial, "no crossing (7, 0)"), "{}", trial.story());
     trial.body.stopped = false;
     trial.tell_mode();
@@ -218,10 +219,10 @@ fn goods_are_not_driven_until_every_joint_is_where_it_is_carried() {
             (1, 1),
             "a person can mend it"
         );
-        // It has only just come to rest.
+        // The robot still rolls to a stop.
         trial.run_for(SECOND / 2);
         assert_stands(&mut trial, SECOND * 3);
-        // Its successor waits as well.
+        // A successor of the navigator waits as well.
         trial.kill(Duration::from_millis(200));
         assert_stands(&mut trial, SECOND * 3);
         trial.body.servos = CARRYING;
@@ -259,7 +260,7 @@ fn with_a_low_battery_the_robot_ends_at_the_next_node_and_goes_on_when_it_is_cha
         assert_stands(&mut trial, SECOND * 5);
         trial.kill(Duration::from_millis(200));
         assert_stands(&mut trial, SECOND * 5);
-        // A little more is not charged.
+        // A little more does not count as charged.
         trial.body.battery = 102;
         assert_stands(&mut trial, SECOND * 5);
         trial.body.battery = 111;
@@ -271,7 +272,7 @@ fn with_a_low_battery_the_robot_ends_at_the_next_node_and_goes_on_when_it_is_cha
 fn without_its_link_the_robot_ends_the_edge_and_goes_on_when_it_is_back() {
     for phase in [Phase::Driving, Phase::Leaving, Phase::Exiting] {
         let mut trial = run_to(phase);
-        trial.tell(Input::Link { lost: true });
+        trial.press(InputKind::LinkLost, 0);
         assert!(
             trial.run_until(SECOND * 60, |trial| hold(trial) == Some(Hold::Link)),
             "{}",
@@ -282,10 +283,10 @@ fn without_its_link_the_robot_ends_the_edge_and_goes_on_when_it_is_back() {
         assert!(off.iter().all(|off| *off < 25.0), "at a node: {off:?}");
         trial.run_for(SECOND);
         assert_stands(&mut trial, SECOND * 5);
-        // Its successor stands too, before anybody tells it.
+        // A successor stands too, before anybody tells it about the link.
         trial.kill(Duration::from_millis(200));
         assert_stands(&mut trial, SECOND * 5);
-        trial.tell(Input::Link { lost: false });
+        trial.press(InputKind::LinkBack, 0);
         trial.deliver(1);
     }
 }
@@ -295,7 +296,7 @@ fn without_its_link_no_order_is_begun_and_a_robot_that_stands_for_two_reasons_wa
     let mut trial = mission();
     trial.deliver(1);
     trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::WaitingForOrder);
-    trial.tell(Input::Link { lost: true });
+    trial.press(InputKind::LinkLost, 0);
     trial.order(2, 2);
     trial.run_for(SECOND * 5);
     let waits = (Phase::WaitingForOrder, 1);
@@ -310,7 +311,7 @@ fn without_its_link_no_order_is_begun_and_a_robot_that_stands_for_two_reasons_wa
     assert_eq!(for_what(&trial), Some(Hold::Link), "nobody has told it");
     trial.body.battery = 90;
     trial.run_for(SECOND * 5);
-    trial.tell(Input::Link { lost: false });
+    trial.press(InputKind::LinkBack, 0);
     trial.run_for(SECOND * 5);
     assert_eq!(for_what(&trial), Some(Hold::Battery));
     trial.body.battery = 111;
@@ -349,14 +350,19 @@ fn with_a_low_battery_no_order_is_begun_until_a_person_wants_it() {
     trial.run_for(SECOND);
     assert_eq!(told(&trial), waits);
     put(&mut trial, (0, 0), 0.0);
-    trial.tell(Input::Reset);
+    trial.press(InputKind::ResetPressed, 0);
     trial.deliver(2);
 }
 
 #[test]
 fn a_turn_that_went_a_quarter_wrong_is_found_out_by_the_next_mark() {
     // On the way to product 1 the robot turns at (2, 0), a border crossing.
-    let map = warehouse((3, 3), (0, 0), 45, &[(2, 1, Side::Left), (0, 0, Side::Up)]);
+    let map = warehouse(
+        (3, 3),
+        (0, 0),
+        45,
+        &[(2, 1, Heading::Left), (0, 0, Heading::Up)],
+    );
     for wrong in [90.0, -90.0] {
         let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
         trial.order(1, 1);

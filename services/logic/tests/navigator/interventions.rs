@@ -1,10 +1,11 @@
-//! What people and faults do to a mission: stop, manual mode, refusals, a lost line.
+//! Tests of interventions in a mission: stop, manual mode, refusals, a lost line, a moved robot.
 
 use std::time::Duration;
 
-use lager_logic::node::Node;
+use lager_floor::{Heading, Node};
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{EventKind, FailureKind, Finish, Mode, Phase, Remedy, Side, WarehouseMap};
+use lager_orders::Mode;
+use lager_topics::{EventKind, FailureKind, Finish, InputKind, Phase, Remedy, WarehouseMap};
 
 use crate::double::{Body, Trouble};
 use crate::floor::{Exit, Floor};
@@ -14,7 +15,7 @@ const EXIT: Exit = Exit::Straight(450.0);
 const SECOND: Duration = Duration::from_secs(1);
 
 fn mission() -> Trial {
-    let products = [(0, 0, Side::Right), (0, 0, Side::Up)];
+    let products = [(0, 0, Heading::Right), (0, 0, Heading::Up)];
     let map = warehouse((1, 1), (0, 0), 45, &products);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     trial.order(1, 1);
@@ -45,11 +46,11 @@ fn set_autonomous(trial: &mut Trial, autonomous: bool) {
     trial.tell_mode();
 }
 
-/// Puts the robot where a new one stands.
+/// Puts the robot in the place of a new one, at the start.
 fn carry_to_start(trial: &mut Trial) {
     let fresh = Body::new(&trial.published, EXIT, Trouble::NONE, 3);
     (trial.body.x, trial.body.y, trial.body.angle) = (fresh.x, fresh.y, fresh.angle);
-    trial.tell(Input::Reset);
+    trial.press(InputKind::ResetPressed, 0);
 }
 
 #[test]
@@ -140,7 +141,7 @@ fn a_robot_driven_by_hand_while_its_navigator_was_away_asks_for_a_reset() {
 
 #[test]
 fn an_order_in_manual_mode_waits_for_the_autonomous_one() {
-    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Down)]);
+    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Heading::Down)]);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     set_autonomous(&mut trial, false);
     trial.order(1, 1);
@@ -253,15 +254,9 @@ fn orders_that_cannot_be_carried_out_are_refused() {
 #[test]
 fn the_signal_for_another_order_does_not_end_the_picking() {
     let mut trial = run_to(Phase::Picking);
-    trial.tell(Input::PickupDone {
-        order_id: 77,
-        forced: false,
-    });
+    trial.press(InputKind::PickupDone, 77);
     assert_eq!(trial.phase(), Phase::Picking);
-    trial.tell(Input::PickupDone {
-        order_id: 0,
-        forced: false,
-    });
+    trial.press(InputKind::PickupDone, 0);
     assert_eq!(trial.phase(), Phase::Leaving);
 }
 
@@ -279,10 +274,10 @@ fn a_lost_line_stops_the_robot() {
 
 #[test]
 fn a_crossing_that_does_not_come_stops_the_robot() {
-    // The squares are told as half as long as they are.
-    let map = warehouse((2, 1), (0, 0), 45, &[(1, 0, Side::Down)]);
+    // The navigator's map has squares of half the real length.
+    let map = warehouse((2, 1), (0, 0), 45, &[(1, 0, Heading::Down)]);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
-    let real = warehouse((2, 1), (0, 0), 90, &[(1, 0, Side::Down)]);
+    let real = warehouse((2, 1), (0, 0), 90, &[(1, 0, Heading::Down)]);
     trial.body.floor = Floor::new(&real, EXIT);
     trial.order(1, 1);
     assert!(trial.run_until(SECOND * 20, |trial| trial.phase() == Phase::Stuck));
@@ -292,7 +287,7 @@ fn a_crossing_that_does_not_come_stops_the_robot() {
 
 #[test]
 fn a_station_without_a_mark_is_looked_for_from_both_ends_and_given_up() {
-    let map = warehouse((2, 2), (0, 0), 45, &[(1, 0, Side::Left)]);
+    let map = warehouse((2, 2), (0, 0), 45, &[(1, 0, Heading::Left)]);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     trial.body.floor = Floor::new(&warehouse((2, 2), (0, 0), 45, &[]), EXIT);
     trial.order(1, 1);
@@ -303,7 +298,7 @@ fn a_station_without_a_mark_is_looked_for_from_both_ends_and_given_up() {
         .iter()
         .map(|(.., node)| (node.x, node.y))
         .collect();
-    // The start, the near end, the far end, the near end, the far end, where it gives up.
+    // The start, then near end and far end twice; at the last one it gives up.
     assert_eq!(nodes, [(0, 0), (1, 0), (1, 1), (1, 0), (1, 1), (1, 1)]);
 }
 
@@ -319,7 +314,7 @@ fn a_turn_past_the_pick_stations_mark_is_noticed_and_the_mark_looked_for() {
     assert_eq!(trial.count(EventKind::InPosition), 1, "{}", trial.story());
 }
 
-/// Half way round to the goods, and standing.
+/// A robot that was stopped half way in its turn to the goods.
 fn stopped_in_the_turn_to_the_station() -> Trial {
     let mut trial = run_to(Phase::Positioning);
     trial.run_for(SECOND);
@@ -347,7 +342,7 @@ fn a_disturbed_turn_that_passed_the_stations_mark_goes_back_to_it_or_comes_from_
     trial.deliver(1);
     assert_eq!(trial.count(EventKind::InPosition), 1, "{}", trial.story());
 
-    // Still there it is not found: from the other end it is looked for anew.
+    // If the robot stays aside, it does not find the mark, and tries again from the other end.
     let goes_past = |trial: &Trial| trial.phase() == Phase::Driving;
     assert!(
         without.run_until(SECOND * 40, goes_past),
@@ -367,7 +362,7 @@ fn a_disturbed_turn_that_passed_the_stations_mark_goes_back_to_it_or_comes_from_
 #[test]
 fn a_station_out_of_sight_after_a_disturbed_turn_is_a_failure_that_says_so() {
     let mut trial = stopped_in_the_turn_to_the_station();
-    // Carried away: there is no tape all round.
+    // A person carries it to a place without tape.
     (trial.body.x, trial.body.y) = (1_000.0, 1_000.0);
     stop(&mut trial, false);
     assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Stuck));
@@ -406,7 +401,7 @@ fn a_silent_sensor_board_is_waited_for() {
 #[test]
 fn without_a_usable_map_nothing_is_done() {
     let mut navigator = Navigator::new(LogicConfig::default());
-    let mut map = warehouse((1, 1), (0, 0), 0, &[(0, 0, Side::Down)]);
+    let mut map = warehouse((1, 1), (0, 0), 0, &[(0, 0, Heading::Down)]);
     let mut hear = |map: &WarehouseMap| {
         let output = navigator.handle(SECOND, Input::Map(map));
         let phase = navigator.status().phase.get();
@@ -423,7 +418,7 @@ fn without_a_usable_map_nothing_is_done() {
 fn a_new_map_is_taken_while_waiting_and_not_on_a_mission() {
     let mut trial = mission();
     trial.run_for(SECOND * 5);
-    let larger = warehouse((3, 3), (3, 3), 60, &[(2, 1, Side::Left)]);
+    let larger = warehouse((3, 3), (3, 3), 60, &[(2, 1, Heading::Left)]);
     trial.tell(Input::Map(&larger));
     assert!(said(&trial, "keep my map"), "{}", trial.story());
     trial.deliver(1);
@@ -440,7 +435,7 @@ fn a_new_map_is_taken_while_waiting_and_not_on_a_mission() {
 fn a_changed_list_of_products_is_taken_on_the_way() {
     let mut trial = mission();
     trial.run_for(SECOND * 5);
-    let products = [(0, 0, Side::Right), (0, 0, Side::Left)];
+    let products = [(0, 0, Heading::Right), (0, 0, Heading::Left)];
     let mut map = warehouse((1, 1), (0, 0), 45, &products);
     map.products[1].id = 5;
     trial.tell(Input::Map(&map));
@@ -450,7 +445,7 @@ fn a_changed_list_of_products_is_taken_on_the_way() {
 
 #[test]
 fn the_route_leads_to_the_goal_and_gets_shorter() {
-    let map = warehouse((3, 2), (0, 0), 45, &[(2, 1, Side::Right)]);
+    let map = warehouse((3, 2), (0, 0), 45, &[(2, 1, Heading::Right)]);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     trial.order(1, 1);
     let length = |trial: &Trial| trial.navigator.route().length;
@@ -468,7 +463,7 @@ fn the_route_leads_to_the_goal_and_gets_shorter() {
     let nodes = trial.navigator.route().nodes();
     assert_eq!((nodes[0].x, nodes[0].y), (3, 1), "back from where it came");
     assert_eq!(nodes.len(), 5);
-    assert_eq!(trial.map().delivery(), Node::new(0, 0));
+    assert_eq!(trial.map().grid.delivery(), Node::new(0, 0));
 }
 
 #[test]

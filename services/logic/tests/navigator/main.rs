@@ -1,4 +1,4 @@
-//! The navigator on whole missions in virtual time, against a small double of the robot.
+//! Tests of the navigator on whole missions in virtual time, with a small double of the robot.
 
 mod double;
 mod floor;

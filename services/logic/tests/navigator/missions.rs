@@ -1,8 +1,9 @@
-//! Whole missions: every corner, every side, every size, with and without trouble.
+//! Tests of whole missions: every corner, every side and every size, with and without disturbances.
 
 use std::time::Duration;
 
-use lager_topics::{EventKind, Side};
+use lager_floor::Heading;
+use lager_topics::EventKind;
 use proptest::prelude::*;
 
 use crate::double::Trouble;
@@ -15,7 +16,7 @@ fn fetch(
     size: (u8, u8),
     delivery: (u8, u8),
     side_cm: u16,
-    product: (u8, u8, Side),
+    product: (u8, u8, Heading),
     exit: Exit,
     trouble: Trouble,
 ) -> Trial {
@@ -71,7 +72,14 @@ fn the_largest_warehouse_with_long_and_short_edges() {
 fn a_way_out_that_curves() {
     for delivery in corners((2, 1)) {
         let exit = Exit::Curved(300.0, 800.0);
-        fetch((2, 1), delivery, 50, (1, 0, Side::Up), exit, Trouble::NONE);
+        fetch(
+            (2, 1),
+            delivery,
+            50,
+            (1, 0, Heading::Up),
+            exit,
+            Trouble::NONE,
+        );
     }
 }
 
@@ -81,7 +89,7 @@ fn every_crossing_on_the_way_is_announced() {
         (3, 1),
         (0, 0),
         50,
-        (2, 0, Side::Down),
+        (2, 0, Heading::Down),
         STRAIGHT,
         Trouble::NONE,
     );
@@ -91,7 +99,7 @@ fn every_crossing_on_the_way_is_announced() {
         .filter(|(kind, ..)| *kind == EventKind::NextNode)
         .map(|(.., node)| (node.x, node.y))
         .collect();
-    // Out along the lower edge to the near end of the station's edge, back, and back again from
+    // Along the lower edge to the near end of the station's edge, back to the corner, and back from
     // the place of delivery.
     assert_eq!(nodes, [(1, 0), (2, 0), (2, 0), (1, 0), (0, 0), (0, 0)]);
 }
@@ -102,11 +110,11 @@ fn a_crossing_passed_straight_on_does_not_stop_the_robot() {
         (4, 1),
         (0, 0),
         50,
-        (3, 0, Side::Down),
+        (3, 0, Heading::Down),
         STRAIGHT,
         Trouble::NONE,
     );
-    // In and out at the station, round at the bar; both ways along the lower edge are straight.
+    // In and out at the station, round at the bar; the lower edge needs no turn.
     let left = trial.body.begun.iter().filter(|code| **code == 7).count();
     let right = trial.body.begun.iter().filter(|code| **code == 10).count();
     assert_eq!((left, right), (2, 2), "{:?}", trial.body.begun);
@@ -115,7 +123,11 @@ fn a_crossing_passed_straight_on_does_not_stop_the_robot() {
 
 #[test]
 fn three_orders_one_after_the_other() {
-    let products = [(0, 0, Side::Up), (1, 1, Side::Left), (1, 0, Side::Right)];
+    let products = [
+        (0, 0, Heading::Up),
+        (1, 1, Heading::Left),
+        (1, 0, Heading::Right),
+    ];
     let mut trial = Trial::new(
         warehouse((2, 2), (2, 0), 50, &products),
         STRAIGHT,
@@ -131,7 +143,7 @@ fn three_orders_one_after_the_other() {
 
 #[test]
 fn a_waiting_order_is_begun_at_the_corner() {
-    let products = [(0, 0, Side::Up), (1, 1, Side::Left)];
+    let products = [(0, 0, Heading::Up), (1, 1, Heading::Left)];
     let mut trial = Trial::new(
         warehouse((2, 2), (0, 0), 50, &products),
         STRAIGHT,

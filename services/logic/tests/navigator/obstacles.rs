@@ -1,15 +1,12 @@
-//! Things that stand on the floor: seen from a node and on the way, driven round, waited for, and
-//! what becomes of a goal to which no way is left.
+//! Tests of things on the floor: the robot sees them from a node or on its way, drives round them
+//! or waits, and reports a goal to which no way is left.
 
 use std::time::Duration;
 
+use lager_floor::{Heading, Node};
 use lager_logic::LogicConfig;
-use lager_logic::heading::{Compass, HEADINGS};
 use lager_logic::map::Map;
-use lager_logic::node::Node;
-use lager_topics::{
-    BlockSource, BlockedWays, EventKind, FailureKind, Heading, Phase, Remedy, Side,
-};
+use lager_topics::{BlockSource, BlockedWays, EventKind, FailureKind, Phase, Remedy};
 use proptest::prelude::*;
 
 use crate::double::Trouble;
@@ -21,7 +18,7 @@ const EXIT: Exit = Exit::Straight(450.0);
 
 type Edge = ((u8, u8), (u8, u8));
 
-fn trial(size: (u8, u8), delivery: (u8, u8), side_cm: u16, product: (u8, u8, Side)) -> Trial {
+fn trial(size: (u8, u8), delivery: (u8, u8), side_cm: u16, product: (u8, u8, Heading)) -> Trial {
     let config = LogicConfig {
         ranger_cm: 80,
         ..LogicConfig::default()
@@ -30,7 +27,7 @@ fn trial(size: (u8, u8), delivery: (u8, u8), side_cm: u16, product: (u8, u8, Sid
     Trial::with(config, map, EXIT, Trouble::NONE, 3)
 }
 
-/// The floor of the examples: the goods on the right edge, two ways there.
+/// The floor of the examples: the goods are on the right edge, with two ways to them.
 ///
 /// ```text
 ///   (0,1)---(1,1)---(2,1)
@@ -38,7 +35,7 @@ fn trial(size: (u8, u8), delivery: (u8, u8), side_cm: u16, product: (u8, u8, Sid
 ///   (0,0)---(1,0)---(2,0)
 /// ```
 fn example(side_cm: u16) -> Trial {
-    trial((2, 1), (0, 0), side_cm, (1, 0, Side::Right))
+    trial((2, 1), (0, 0), side_cm, (1, 0, Heading::Right))
 }
 
 fn put(trial: &mut Trial, (a, b): Edge) {
@@ -62,7 +59,7 @@ fn failure(trial: &Trial) -> (Option<FailureKind>, Option<Remedy>) {
     (failure.kind.get(), failure.remedy.get())
 }
 
-/// Whether it tries the ways again before long.
+/// Whether the robot tries the ways again within 70 s.
 fn goes_on(trial: &mut Trial) -> bool {
     trial.run_until(SECOND * 70, |trial| trial.phase() != Phase::Stuck)
 }
@@ -95,8 +92,8 @@ fn a_turn_before_what_stands_close_behind_its_node_has_room() {
 
 #[test]
 fn who_would_touch_a_thing_behind_the_next_node_turns_back_before_it_and_goes_another_way() {
-    // The body reaches 170 mm ahead of the axle. In squares of 40 cm what stands in the middle of a
-    // way begins 160 mm behind its node; in larger ones it may stand anywhere.
+    // The body reaches 170 mm ahead of the axle. In squares of 40 cm a thing in the middle of a way
+    // begins 160 mm behind its node; in larger squares it may stand anywhere.
     for (side_cm, behind) in [(40, 160.0), (50, 165.0), (60, 120.0), (100, 140.0)] {
         let mut trial = example(side_cm);
         let at = f64::from(side_cm) * 10.0 + behind;
@@ -127,9 +124,9 @@ fn what_is_seen_from_a_node_is_driven_round_without_going_near_it() {
 
 #[test]
 fn an_open_way_straight_on_is_looked_at_without_standing() {
-    let mut trial = trial((4, 1), (0, 0), 50, (3, 0, Side::Down));
+    let mut trial = trial((4, 1), (0, 0), 50, (3, 0, Heading::Down));
     trial.order(1, 1);
-    // From the first drive until the goods are reached nothing but forwards is ordered.
+    // From the first drive until it reaches the goods, the only command is "forward".
     let drives = |trial: &Trial| trial.navigator.status().code == 3;
     assert!(trial.run_until(SECOND, drives), "{}", trial.story());
     while trial.phase() != Phase::Positioning {
@@ -141,7 +138,7 @@ fn an_open_way_straight_on_is_looked_at_without_standing() {
 
 #[test]
 fn who_comes_upon_a_thing_on_the_way_goes_back_to_the_node_it_came_from() {
-    // Seen from afar in the first case, put down before the robot in the second.
+    // Seen from afar in the first case, put down just before the robot in the second.
     for (side_cm, late) in [(240, false), (120, true)] {
         let mut trial = example(side_cm);
         trial.order(1, 1);
@@ -223,7 +220,7 @@ fn who_must_look_and_hears_no_distance_stands_and_says_what_would_end_it() {
 
 #[test]
 fn a_killed_navigator_goes_round_what_it_has_seen() {
-    let mut trial = trial((1, 1), (0, 0), 70, (0, 0, Side::Up));
+    let mut trial = trial((1, 1), (0, 0), 70, (0, 0, Heading::Up));
     put(&mut trial, ((0, 0), (0, 1)));
     trial.order(1, 1);
     let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
@@ -243,14 +240,14 @@ fn a_killed_navigator_goes_round_what_it_has_seen() {
 
 #[test]
 fn a_navigator_killed_while_it_turns_back_turns_back_all_the_same() {
-    // So near to the node that it backs up, and so far that it turns round.
+    // Near enough to the node to back up, and too far, so that it turns round.
     for far in [60.0, 150.0, 190.0] {
         killed_on_the_way_back(far);
     }
 }
 
 fn killed_on_the_way_back(far: f64) {
-    let mut trial = trial((1, 1), (0, 0), 100, (0, 0, Side::Up));
+    let mut trial = trial((1, 1), (0, 0), 100, (0, 0, Heading::Up));
     trial.order(1, 1);
     assert!(trial.run_until(SECOND * 60, |trial| trial.body.y > far
         || trial.body.x > far));
@@ -274,7 +271,7 @@ fn a_navigator_killed_while_it_backs_up_from_a_node_to_turn_round_does_so_all_th
     }
 }
 
-/// Kills it again and again from where it halts until it has turned round.
+/// Kills the navigator again and again, from the halt until the robot has turned round.
 fn turns_back_however_it_is_killed(mut trial: Trial) {
     assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Halted));
     let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
@@ -293,8 +290,8 @@ fn turns_back_however_it_is_killed(mut trial: Trial) {
     assert!(kills > 15, "only {kills}");
 }
 
-/// Edges and quarter turns of the best way to the nearest of `goals`, by relaxing every move until
-/// nothing changes.
+/// The number of edges and quarter turns of the best way to the nearest of `goals`: relaxes every
+/// move until nothing changes.
 fn best(
     map: &Map,
     ways: &BlockedWays,
@@ -302,15 +299,15 @@ fn best(
     goals: [Node; 2],
 ) -> Option<(u16, u16)> {
     let is_open = |node: Node, heading: Heading| {
-        let there = map.neighbour(node, heading)?;
+        let there = map.grid.neighbour(node, heading)?;
         let closed = ways.ways().iter().any(|way| {
             let (at, along) = (Node::new(way.x, way.y), way.heading.get().unwrap());
             (at, along) == (node, heading) || (at, along) == (there, heading.back())
         });
         (!closed).then_some(there)
     };
-    let pose = |node: Node, heading: Heading| map.index(node) * 4 + heading as usize;
-    let mut costs = vec![None; map.node_count() * 4];
+    let pose = |node: Node, heading: Heading| map.grid.index(node) * 4 + heading as usize;
+    let mut costs = vec![None; map.grid.node_count() * 4];
     costs[pose(from.0, from.1)] = Some((0, 0));
     let mut changed = true;
     while std::mem::take(&mut changed) {
@@ -318,12 +315,12 @@ fn best(
             let Some((edges, turns)) = costs[place] else {
                 continue;
             };
-            for heading in HEADINGS {
-                let Some(there) = is_open(map.node(place / 4), heading) else {
+            for heading in Heading::ALL {
+                let Some(there) = is_open(map.grid.node(place / 4), heading) else {
                     continue;
                 };
                 let quarters =
-                    [0, 1, 2, 1][usize::from(HEADINGS[place % 4].quarters_right_to(heading))];
+                    [0, 1, 2, 1][usize::from(Heading::ALL[place % 4].quarters_right_to(heading))];
                 let cost = (edges + 1, turns + quarters);
                 let known = &mut costs[pose(there, heading)];
                 if known.is_none_or(|known| cost < known) {
@@ -335,11 +332,11 @@ fn best(
     }
     let arrivals = goals
         .into_iter()
-        .flat_map(|goal| HEADINGS.map(|heading| pose(goal, heading)));
+        .flat_map(|goal| Heading::ALL.map(|heading| pose(goal, heading)));
     arrivals.filter_map(|place| costs[place]).min()
 }
 
-/// Edges and quarter turns of the published route from where the robot is.
+/// The number of edges and quarter turns of the published route from the robot's place.
 fn planned(trial: &Trial) -> (u16, u16) {
     let status = trial.navigator.status();
     let mut at = Node::new(status.x as u8, status.y as u8);
@@ -347,7 +344,7 @@ fn planned(trial: &Trial) -> (u16, u16) {
     let mut turns = 0;
     for step in trial.navigator.route().nodes() {
         let to = Node::new(step.x, step.y);
-        let next = HEADINGS
+        let next = Heading::ALL
             .into_iter()
             .find(|next| next.step_from(at) == Some(to))
             .unwrap();
@@ -357,13 +354,13 @@ fn planned(trial: &Trial) -> (u16, u16) {
     (trial.navigator.route().length, turns)
 }
 
-/// Where the goods, or the delivery, are to be reached.
+/// The nodes from which the robot reaches the goods, or the delivery.
 fn goals(trial: &Trial) -> [Node; 2] {
     let status = trial.navigator.status();
     let map = trial.map();
     match status.goal.get().unwrap() {
-        lager_topics::Goal::Product => map.station(status.product).unwrap().ends,
-        _ => [map.delivery(); 2],
+        lager_topics::Goal::Product => map.station(status.product).unwrap().edge.ends(),
+        _ => [map.grid.delivery(); 2],
     }
 }
 
@@ -386,7 +383,7 @@ proptest! {
         for (x, y, up) in edges {
             let from = Node::new(x % (width + 1), y % (height + 1));
             let heading = if up { Heading::Up } else { Heading::Right };
-            if let Some(to) = map.neighbour(from, heading) {
+            if let Some(to) = map.grid.neighbour(from, heading) {
                 put(&mut trial, ((from.x, from.y), (to.x, to.y)));
             }
         }
@@ -397,7 +394,7 @@ proptest! {
             trial.step();
             prop_assert!(trial.body.now < SECOND * 1_500, "{}", trial.story());
             let status = trial.navigator.status();
-            // At a node, before it drives: what it means to do must be the best it can know.
+            // At a node, before it drives: with the known blocks no plan is better.
             let decision = (status.x, status.y, status.heading, trial.navigator.blocks());
             let decides = matches!(status.phase.get(), Some(Phase::Looking | Phase::Turning));
             if decides && decided != Some(decision) {
@@ -413,14 +410,14 @@ proptest! {
         }
         prop_assert!(!trial.body.touched, "{}", trial.story());
         if unreachable(&trial) {
-            // Then all that stands in the way has been seen.
+            // Then the robot has seen everything that stands in the way.
             let status = trial.navigator.status();
             let from = (Node::new(status.x as u8, status.y as u8), status.heading.get().unwrap());
             let ways = trial.navigator.blocks();
             let reached = best(&map, &ways, from, goals(&trial));
             prop_assert!(reached.is_none() || goals(&trial).iter().all(|goal| {
                 map.station(status.product).is_some_and(|station| {
-                    station.heading_from(*goal).is_some()
+                    station.edge.heading_from(*goal).is_some()
                 })
             }), "{}", trial.story());
         }

@@ -1,10 +1,12 @@
-//! The robot picks by itself: it finds the goods, aims elsewhere where there are none, and says so
-//! when it finds nothing at all.
+//! Tests of a robot that picks by itself: it grips the goods, aims elsewhere if it grips nothing,
+//! and reports the goods as missing in the end.
 
 use std::time::Duration;
 
-use lager_logic::{Input, LogicConfig};
-use lager_topics::{EventKind, FailureKind, Hold, Phase, Pick, Remedy, Side};
+use lager_floor::Heading;
+use lager_logic::LogicConfig;
+use lager_orders::Pick;
+use lager_topics::{EventKind, FailureKind, Hold, InputKind, Phase, Remedy};
 use lager_wire::Command;
 
 use crate::double::{CARRYING, Trouble};
@@ -13,13 +15,13 @@ use crate::trial::{Trial, warehouse};
 
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A robot with goods, if there are any, where its base has to look along `goods_at`.
+/// A robot whose base must be at `goods_at` to grip the goods; `None` = there are no goods.
 fn at_the_goods(goods_at: Option<u16>) -> Trial {
     let config = LogicConfig {
         pick: Pick::Auto,
         ..LogicConfig::default()
     };
-    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Up)]);
+    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Heading::Up)]);
     let mut trial = Trial::with(config, map, Exit::Straight(450.0), Trouble::NONE, 3);
     trial.body.goods_at = goods_at;
     trial.order(1, 1);
@@ -39,16 +41,16 @@ fn goods_ahead_or_to_either_side_are_picked_and_delivered() {
     }
 }
 
-/// Brings a robot to its goods that leaves picking to a person.
+/// Brings a robot that leaves picking to a person to its goods.
 fn waiting_at_the_goods() -> Trial {
-    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Up)]);
+    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Heading::Up)]);
     let config = LogicConfig::default();
     let mut trial = Trial::with(config, map, Exit::Straight(450.0), Trouble::NONE, 3);
     trial.body.goods_at = Some(512);
     trial.order(1, 1);
     let came = trial.run_until(SECOND * 90, |trial| trial.phase() == Phase::Picking);
     assert!(came, "{}", trial.story());
-    // Nothing is in the claw.
+    // The claw is empty.
     trial.body.claw_load = 0;
     trial.run_for(SECOND / 5);
     trial
@@ -68,14 +70,14 @@ fn who_picks_may_change_while_it_waits_at_the_goods_and_outlives_the_navigator()
         grants_the_arm(&trial),
         "nobody has told the successor to pick"
     );
-    trial.tell(Input::Pick(Pick::Auto));
+    trial.press(InputKind::PickByItself, 0);
     trial.run_for(SECOND / 5);
     assert!(!grants_the_arm(&trial), "the arm is the robot's own");
     trial.kill(SECOND / 5);
     assert_eq!(trial.navigator.status().pick, Pick::Auto);
-    // Whoever changes his mind does not stop an arm half-way.
+    // A person who changes the way of picking does not stop the arm half-way.
     trial.run_for(SECOND / 2);
-    trial.tell(Input::Pick(Pick::Manual));
+    trial.press(InputKind::PickByHand, 0);
     let left = trial.run_until(SECOND * 60, |trial| trial.phase() != Phase::Picking);
     assert!(left, "{}", trial.story());
     assert_eq!(trial.navigator.status().pick, Pick::Manual);
@@ -86,7 +88,7 @@ fn goods_that_a_person_holds_in_the_claw_are_not_put_down_to_be_picked_again() {
     let mut trial = waiting_at_the_goods();
     trial.body.claw_load = -311;
     trial.run_for(SECOND / 5);
-    trial.tell(Input::Pick(Pick::Auto));
+    trial.press(InputKind::PickByItself, 0);
     trial.run_for(SECOND / 10);
     assert!(grants_the_arm(&trial), "they are the person's to hand over");
 }
@@ -105,7 +107,7 @@ fn where_there_is_nothing_a_hand_is_waited_for() {
     );
     assert_eq!(trial.count(EventKind::Failed), 1);
     assert_eq!(trial.phase(), Phase::Picking);
-    // Its successor does not begin anew, and a person may move the arm.
+    // A successor does not begin again, and a person may move the arm.
     trial.kill(SECOND / 5);
     trial.run_for(SECOND);
     let order = trial.navigator.current_order().unwrap();
@@ -114,16 +116,13 @@ fn where_there_is_nothing_a_hand_is_waited_for() {
     trial.body.claw_load = -311;
     trial.run_for(SECOND / 5);
     let order_id = trial.status.order_id;
-    trial.tell(Input::PickupDone {
-        order_id,
-        forced: false,
-    });
+    trial.press(InputKind::PickupDone, order_id);
     assert!(trial.navigator.status().failure.is_none());
     trial.deliver(1);
 }
 
-/// Delivers after harm at each moment of what the robot does, `apart` from each other. How many
-/// moments there were.
+/// Disturbs copies of the trial with `harm` at moments that are `apart` from each other, and lets
+/// each copy deliver. Returns the number of moments.
 fn harmed_at_any_moment(
     mut trial: Trial,
     apart: Duration,
@@ -195,14 +194,14 @@ fn an_arm_that_never_obeys_ends_in_a_failure() {
     assert!(gave_up, "{}", trial.story());
 }
 
-/// A robot that has found nothing at product 1, its arm over the empty shelf, whose order is then
-/// taken back. Product 2 is there.
+/// A robot that has found nothing at product 1, with its arm over the empty shelf. Then that order
+/// is cancelled. The next one is for product 2, which is there.
 fn sent_away_from_nothing() -> Trial {
     let config = LogicConfig {
         pick: Pick::Auto,
         ..LogicConfig::default()
     };
-    let products = [(0, 0, Side::Up), (0, 0, Side::Right)];
+    let products = [(0, 0, Heading::Up), (0, 0, Heading::Right)];
     let map = warehouse((1, 1), (0, 0), 45, &products);
     let mut trial = Trial::with(config, map, Exit::Straight(450.0), Trouble::NONE, 3);
     trial.order(1, 1);
@@ -211,7 +210,7 @@ fn sent_away_from_nothing() -> Trial {
     });
     assert!(gave_up, "{}", trial.story());
     trial.run_for(SECOND / 5);
-    trial.tell(Input::Cancel(1));
+    trial.press(InputKind::OrderCancelled, 1);
     trial.order(2, 2);
     trial.body.goods_at = Some(512);
     trial

@@ -1,12 +1,12 @@
-//! The orders that wait (F3): in the order given, put off where there is no way, changed while the
-//! robot drives, and kept over a kill at any moment.
+//! Tests of the waiting orders (F3): carried out in their order, put off without a way, changed by
+//! people while the robot drives, and kept after a kill at any moment.
 
 use std::time::Duration;
 
-use lager_logic::node::Node;
+use lager_floor::Heading;
 use lager_logic::queue::MOST_ORDERS;
-use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{BlockSource, EventKind, FailureKind, Heading, Hold, OrderQueue, Phase, Side};
+use lager_logic::{LogicConfig, Navigator};
+use lager_topics::{EventKind, FailureKind, Hold, InputKind, OrderQueue, Phase};
 
 use crate::double::{Body, Trouble};
 use crate::floor::Exit;
@@ -15,16 +15,20 @@ use crate::trial::{Trial, warehouse};
 const EXIT: Exit = Exit::Straight(450.0);
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A robot with nothing to do. Product 2 is on its way to product 1, and 3 elsewhere. Product 4
-/// stands where 1 does, and so on.
+/// A robot with nothing to do. Product 2 is on the way to product 1, and product 3 elsewhere.
+/// Product 4 is in the place of product 1, and so on.
 fn robot() -> Trial {
-    let places = [(1, 0, Side::Right), (0, 0, Side::Down), (0, 0, Side::Left)];
+    let places = [
+        (1, 0, Heading::Right),
+        (0, 0, Heading::Down),
+        (0, 0, Heading::Left),
+    ];
     let products: Vec<_> = places.into_iter().cycle().take(MOST_ORDERS + 2).collect();
     let map = warehouse((2, 1), (0, 0), 45, &products);
     Trial::new(map, EXIT, Trouble::NONE, 3)
 }
 
-/// The same, with orders 1, 2, 3, … for these products, the first of them under way.
+/// The same robot with orders 1, 2, 3, … for these products; it has begun the first one.
 fn busy(products: &[i32]) -> Trial {
     let mut trial = robot();
     for (id, product) in (1..).zip(products) {
@@ -38,20 +42,19 @@ fn waiting(trial: &Trial) -> Vec<u32> {
     trial.queue.orders().iter().map(|order| order.id).collect()
 }
 
-/// The orders of the events of one kind, each time it happened.
+/// The order number of each event of one kind, in turn.
 fn orders(trial: &Trial, wanted: EventKind) -> Vec<u32> {
     let of_kind = trial.events.iter().filter(|(kind, ..)| *kind == wanted);
     of_kind.map(|(_, id, _)| *id).collect()
 }
 
-/// A person closes or opens the way upwards and to the right of the robot's start, or one of them.
+/// A person closes or opens the way from a node along a heading.
 fn way(trial: &mut Trial, node: (u8, u8), heading: Heading, open: bool) {
-    trial.tell(Input::Way {
-        node: Node::new(node.0, node.1),
-        heading,
-        open,
-        source: BlockSource::Person,
-    });
+    let kind = match open {
+        true => InputKind::WayOpened,
+        false => InputKind::WayBlocked,
+    };
+    trial.press_at(kind, node, heading);
 }
 
 #[test]
@@ -75,24 +78,24 @@ fn orders_are_carried_out_in_the_order_given() {
 #[test]
 fn waiting_orders_are_cancelled_moved_up_and_cleared_while_it_drives() {
     let mut trial = busy(&[1, 2, 3, 4]);
-    trial.tell(Input::MoveUp(4));
+    trial.press(InputKind::OrderMovedUp, 4);
     assert_eq!(waiting(&trial), [2, 4, 3]);
-    trial.tell(Input::MoveUp(4));
-    trial.tell(Input::MoveUp(4));
+    trial.press(InputKind::OrderMovedUp, 4);
+    trial.press(InputKind::OrderMovedUp, 4);
     assert_eq!(
         waiting(&trial),
         [4, 2, 3],
         "before the first there is no place"
     );
-    trial.tell(Input::Cancel(2));
-    trial.tell(Input::Cancel(77));
-    trial.tell(Input::MoveUp(77));
-    trial.tell(Input::MoveUp(1));
+    trial.press(InputKind::OrderCancelled, 2);
+    trial.press(InputKind::OrderCancelled, 77);
+    trial.press(InputKind::OrderMovedUp, 77);
+    trial.press(InputKind::OrderMovedUp, 1);
     assert_eq!(waiting(&trial), [4, 3], "what is under way does not wait");
     let mut cleared = trial.clone();
     trial.deliver(3);
     assert_eq!(orders(&trial, EventKind::ItemDelivered), [1, 4, 3]);
-    cleared.tell(Input::ClearQueue);
+    cleared.press(InputKind::QueueCleared, 0);
     assert_eq!(waiting(&cleared), [0; 0]);
     cleared.deliver(1);
 }
@@ -117,7 +120,7 @@ fn a_full_queue_refuses_and_says_how_many_wait() {
 #[test]
 fn an_order_without_a_way_is_put_off_and_carried_out_when_one_opens() {
     let mut trial = robot();
-    // Nothing leads to the left edge any more: it is itself what is closed.
+    // No way is left to the goods on the left edge, because that edge itself is closed.
     way(&mut trial, (0, 0), Heading::Up, false);
     trial.order(1, 3);
     trial.order(2, 2);
@@ -136,7 +139,7 @@ fn an_order_without_a_way_is_put_off_and_carried_out_when_one_opens() {
 fn an_order_that_loses_its_way_waits_while_another_one_is_carried_out() {
     let mut trial = busy(&[1, 2]);
     assert_eq!(trial.queue.order_id, 1);
-    // The edge of product 1 is closed while the robot is on its way there.
+    // A person closes the edge of product 1 while the robot drives there.
     way(&mut trial, (2, 0), Heading::Up, false);
     trial.deliver_but(1, 1);
     assert_eq!(orders(&trial, EventKind::ItemDelivered), [2]);
@@ -154,13 +157,13 @@ fn who_waits_at_home_for_a_way_to_a_cancelled_order_waits_no_more() {
     trial.step();
     let failure = trial.navigator.status().failure;
     assert_eq!(failure.kind.get(), Some(FailureKind::NoWay));
-    trial.tell(Input::Cancel(1));
+    trial.press(InputKind::OrderCancelled, 1);
     assert!(trial.navigator.status().failure.is_none());
     trial.order(2, 2);
     trial.deliver(1);
 }
 
-/// A robot on its way to product 1 that has no way there any more, and no other order.
+/// A robot on its way to product 1, with no way there any more and no other order.
 fn without_a_way() -> Trial {
     let mut trial = busy(&[1]);
     way(&mut trial, (2, 0), Heading::Up, false);
@@ -203,10 +206,10 @@ fn who_waits_for_a_way_and_is_driven_by_hand_does_not_know_its_place_any_more() 
 fn the_order_under_way_is_taken_back_at_any_moment_before_its_goods_are_held() {
     let mut trial = busy(&[1]);
     let mut count = 0;
-    // The operator says after 600 ms that the goods are held, which the claw feels.
+    // After 600 ms the operator says that the claw holds the goods, and the claw feels them.
     while trial.phase() != Phase::Picking {
         let mut fork = trial.clone();
-        fork.tell(Input::Cancel(1));
+        fork.press(InputKind::OrderCancelled, 1);
         assert_eq!((fork.queue.under_way, fork.queue.count), (0, 0));
         if count % 7 == 0 {
             fork.kill(Duration::from_millis(300));
@@ -223,7 +226,7 @@ fn the_order_under_way_is_taken_back_at_any_moment_before_its_goods_are_held() {
         count += 1;
     }
     assert!(count > 100, "only {count} moments");
-    trial.tell(Input::Cancel(1));
+    trial.press(InputKind::OrderCancelled, 1);
     assert_eq!(trial.queue.under_way, 1);
     let said = trial.thoughts.last().unwrap();
     assert!(said.contains("I bring product 1 all the same"), "{said}");
@@ -241,7 +244,7 @@ fn who_stands_at_goods_that_nobody_picks_leaves_without_them_when_the_arm_is_car
     trial.body.claw_load = -20;
     trial.body.servos[shoulder] += 100;
     trial.run_for(SECOND / 10);
-    trial.tell(Input::Cancel(1));
+    trial.press(InputKind::OrderCancelled, 1);
     trial.run_for(SECOND / 2);
     trial.kill(SECOND / 5);
     trial.run_for(SECOND);
@@ -271,7 +274,7 @@ fn who_waits_at_goods_for_a_way_does_not_leave_with_its_arm_over_them() {
     (trial.body.servos[claw], trial.body.claw_load) = (210, -20);
     trial.body.servos[shoulder] += 100;
     trial.run_for(SECOND / 10);
-    trial.tell(Input::Cancel(1));
+    trial.press(InputKind::OrderCancelled, 1);
     trial.run_for(SECOND);
     let failure = trial.navigator.status().failure;
     assert_eq!(failure.kind, FailureKind::NoWay, "{}", trial.story());
@@ -297,7 +300,7 @@ fn a_reset_gives_up_what_is_under_way_and_nothing_that_waits() {
     trial.run_for(SECOND);
     let start = Body::new(&trial.published, EXIT, Trouble::NONE, 3);
     (trial.body.x, trial.body.y, trial.body.angle) = (start.x, start.y, start.angle);
-    trial.tell(Input::Reset);
+    trial.press(InputKind::ResetPressed, 0);
     assert_eq!(orders(&trial, EventKind::Refused), [1]);
     trial.body.stopped = false;
     trial.tell_mode();
@@ -308,14 +311,14 @@ fn a_reset_gives_up_what_is_under_way_and_nothing_that_waits() {
 #[test]
 fn every_order_survives_a_kill_at_every_step() {
     let mut trial = busy(&[2]);
-    // One has no way until the others are delivered, so that it is put off as well.
+    // One order has no way until the others are delivered, so it is put off.
     way(&mut trial, (1, 0), Heading::Right, false);
     way(&mut trial, (1, 1), Heading::Right, false);
     trial.order(2, 1);
     trial.order(3, 3);
     let mut kills = 0;
     while orders(&trial, EventKind::ItemDelivered) != [1, 3] {
-        // Killed between any two of its words: with what it had published of each.
+        // The kill may come between status and queue: tries each mix of old and new ones.
         let (before, queue) = (trial.status, trial.queue);
         trial.step();
         kills += 1;

@@ -1,12 +1,11 @@
-//! The navigator is killed, and its successor has only the last status.
+//! Tests with a killed navigator, whose successor has only its last published state.
 
 use std::time::Duration;
 
-use lager_logic::heading::Compass;
+use lager_floor::Heading;
 use lager_logic::{Input, LogicConfig, Navigator};
 use lager_topics::{
-    BlockSource, BlockedWays, EventKind, FailureKind, NavigatorStatus, OrderQueue, Phase, Remedy,
-    Side,
+    BlockedWays, EventKind, FailureKind, InputKind, NavigatorStatus, OrderQueue, Phase, Remedy,
 };
 use lager_wire::{Command, LineState};
 use proptest::prelude::*;
@@ -17,24 +16,24 @@ use crate::trial::{SIDES, Trial, corners, missions, warehouse};
 
 const EXIT: Exit = Exit::Straight(450.0);
 
-fn mission(size: (u8, u8), delivery: (u8, u8), product: (u8, u8, Side)) -> Trial {
+fn mission(size: (u8, u8), delivery: (u8, u8), product: (u8, u8, Heading)) -> Trial {
     let map = warehouse(size, delivery, 45, &[product]);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     trial.order(1, 1);
     trial
 }
 
-/// A successor with nothing but the status.
+/// A successor that has nothing but the status.
 fn resumed(status: &NavigatorStatus) -> Navigator {
     let (blocks, queue) = (BlockedWays::default(), OrderQueue::default());
     Navigator::resume(LogicConfig::default(), status, &blocks, &queue)
 }
 
-/// Ends the mission and checks that it came to what it was to come to.
+/// Delivers, and checks the events of the mission.
 fn finish(mut trial: Trial, killed_at: Duration) {
     trial.thoughts.push(format!("(killed at {killed_at:?})"));
     trial.deliver(1);
-    // An event announced just before the kill may be announced again, never left out.
+    // An event from just before the kill may come twice, but must not be missing.
     assert!(
         trial.count(EventKind::GettingItem) >= 1,
         "{}",
@@ -48,8 +47,8 @@ fn finish(mut trial: Trial, killed_at: Duration) {
     );
 }
 
-/// Kills at every step of the mission, with outages of all lengths in turn, and with a map that
-/// comes at once or late.
+/// Kills the navigator at every step of the mission, with outages of all lengths in turn, and with
+/// a map that comes at once or late.
 fn killed_everywhere(mut trial: Trial) {
     let outages = [20, 90, 130, 250, 700, 1500].map(Duration::from_millis);
     let lates = [0, 10, 45, 90, 200].map(Duration::from_millis);
@@ -71,29 +70,29 @@ fn killed_everywhere(mut trial: Trial) {
 
 #[test]
 fn a_mission_with_a_right_turn_survives_a_kill_at_every_step() {
-    killed_everywhere(mission((1, 1), (0, 0), (0, 0, Side::Up)));
+    killed_everywhere(mission((1, 1), (0, 0), (0, 0, Heading::Up)));
 }
 
 #[test]
 fn a_mission_with_a_left_turn_survives_a_kill_at_every_step() {
-    killed_everywhere(mission((1, 1), (0, 1), (0, 0, Side::Right)));
+    killed_everywhere(mission((1, 1), (0, 1), (0, 0, Heading::Right)));
 }
 
 #[test]
 fn a_status_goes_through_a_navigator_unchanged() {
-    let mut trial = mission((2, 1), (2, 0), (0, 0, Side::Left));
+    let mut trial = mission((2, 1), (2, 0), (0, 0, Heading::Left));
     while trial.status.delivered == 0 {
         trial.run_for(STEP * 7);
-        // Without a mode there is nobody to have moved the robot meanwhile.
+        // The values of a navigator that knows no mode yet and no distance.
         let status = NavigatorStatus {
             stopped: 1,
-            mode: lager_topics::Mode::Manual.into(),
+            mode: lager_orders::Mode::Manual.into(),
             remedy: Remedy::Mode.into(),
             distance_cm: 255,
             ..trial.navigator.status()
         };
         let again = resumed(&status).status();
-        // Of a setpoint the number is not sure.
+        // A successor does not know the exact number of a setpoint.
         let order = Command::from_code(status.code).unwrap();
         let left_out = u32::from(!order.is_one_shot());
         assert_eq!(
@@ -109,7 +108,7 @@ fn a_status_goes_through_a_navigator_unchanged() {
 
 #[test]
 fn a_waiting_order_survives() {
-    let products = [(0, 0, Side::Up), (0, 0, Side::Right)];
+    let products = [(0, 0, Heading::Up), (0, 0, Heading::Right)];
     let map = warehouse((1, 1), (0, 0), 45, &products);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     trial.order(1, 1);
@@ -129,7 +128,7 @@ fn a_waiting_order_survives() {
 #[test]
 fn an_order_that_waits_for_its_mode_survives_whatever_is_told_first() {
     for mode_first in [false, true] {
-        let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Up)]);
+        let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Heading::Up)]);
         let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
         trial.body.autonomous = false;
         trial.tell_mode();
@@ -153,7 +152,7 @@ fn an_order_that_waits_for_its_mode_survives_whatever_is_told_first() {
 
 #[test]
 fn a_granted_arm_stays_granted() {
-    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Down));
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Heading::Down));
     assert!(
         trial.run_until(Duration::from_secs(60), |trial| trial.phase()
             == Phase::Picking)
@@ -165,7 +164,7 @@ fn a_granted_arm_stays_granted() {
 
 #[test]
 fn two_frames_of_noise_around_a_kill_are_not_the_cross_bar() {
-    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Down));
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Heading::Down));
     let on_its_way_out = |trial: &Trial| {
         trial.phase() == Phase::Exiting && trial.navigator.status().travelled_mm > 100
     };
@@ -182,7 +181,7 @@ fn two_frames_of_noise_around_a_kill_are_not_the_cross_bar() {
 
 #[test]
 fn order_ids_go_on_after_the_old_ones() {
-    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Heading::Up));
     trial.run_for(Duration::from_secs(6));
     let before = trial.status.command_id;
     trial.kill(Duration::from_millis(300));
@@ -196,7 +195,7 @@ fn order_ids_go_on_after_the_old_ones() {
 
 #[test]
 fn without_the_map_nothing_is_ordered() {
-    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Heading::Up));
     trial.run_for(Duration::from_secs(6));
     let navigator = resumed(&trial.status);
     assert_eq!(navigator.current_order(), None);
@@ -216,7 +215,7 @@ fn a_status_that_makes_no_sense_is_as_good_as_none() {
     );
 }
 
-/// A mission that is ordered at once and is killed so many ms after it runs again, for so many ms.
+/// Orders a product; each pair of `kills` has the ms until a kill and the ms of its outage.
 fn killed(mut trial: Trial, kills: impl IntoIterator<Item = (u64, u64)>) -> Trial {
     trial.order(1, 1);
     for (after, outage) in kills {
@@ -227,8 +226,8 @@ fn killed(mut trial: Trial, kills: impl IntoIterator<Item = (u64, u64)>) -> Tria
     trial
 }
 
-/// Two robots on their way back, pushed aside so shortly before the delivery corner that they pass
-/// it without seeing its mark: on their side of the line it is too short for the sensors.
+/// Two robots on their way back, pushed aside just before the delivery corner. They pass it without
+/// seeing its mark, which on their side of the line is too short for the sensors.
 fn beside_their_lines() -> [Trial; 2] {
     let robot = |size, delivery, product, aside_mm: f64| {
         let map = warehouse(size, delivery, 50, &[product]);
@@ -241,10 +240,10 @@ fn beside_their_lines() -> [Trial; 2] {
             "{}",
             trial.story()
         );
-        trial.body.y = f64::from(trial.map().delivery().y) * 500.0 + aside_mm;
+        trial.body.y = f64::from(trial.map().grid.delivery().y) * 500.0 + aside_mm;
         trial
     };
-    let (below, left) = ((0, 1, Side::Down), (1, 1, Side::Left));
+    let (below, left) = ((0, 1, Heading::Down), (1, 1, Heading::Left));
     [
         robot((1, 2), (0, 0), below, -24.0),
         robot((2, 2), (0, 2), left, 24.0),
@@ -263,12 +262,9 @@ fn a_robot_that_has_not_seen_the_delivery_corner_drives_on_to_the_next_and_comes
 #[test]
 fn a_robot_that_has_not_seen_the_delivery_corner_says_so_where_the_way_on_is_blocked() {
     for mut trial in beside_their_lines() {
-        trial.tell(Input::Way {
-            node: trial.map().delivery(),
-            heading: trial.map().exit().back(),
-            open: false,
-            source: BlockSource::Person,
-        });
+        let grid = &trial.map().grid;
+        let (node, heading) = (grid.delivery(), grid.exit().back());
+        trial.press_at(InputKind::WayBlocked, (node.x, node.y), heading);
         assert!(
             trial.run_until(Duration::from_secs(30), |trial| trial.phase()
                 == Phase::Stuck)

@@ -1,14 +1,15 @@
-//! A navigator on the double, with the shell's duties (renewal, status before order) and an
-//! operator who picks; and what a mission must have come to.
+//! A trial: a navigator that drives the double, with the shell's work (renewal, status before
+//! order) and an operator who picks; and the checks of a finished mission.
 
 use std::time::Duration;
 
+use lager_floor::{Heading, Node};
 use lager_logic::map::Map;
-use lager_logic::node::Node;
 use lager_logic::{Input, LogicConfig, Navigator, Output};
+use lager_orders::{Mode, Pick};
 use lager_topics::{
-    BlockedWays, EventKind, MapProduct, Mode, NavigatorStatus, Order, OrderQueue, Phase, Pick,
-    Side, WarehouseMap,
+    BlockedWays, EventKind, InputKind, MapProduct, NavigatorStatus, Order, OrderQueue, Phase,
+    WarehouseMap,
 };
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 
@@ -19,9 +20,9 @@ const RENEWAL: Duration = Duration::from_millis(40);
 const STATUS_PERIOD: Duration = Duration::from_millis(50);
 const PICKING: Duration = Duration::from_millis(600);
 
-/// How far off the axle may be at a place where it stands, in mm.
+/// How far the axle may be from the place where the robot should stand, in mm.
 const PLACE_MM: f64 = 25.0;
-/// How far off the robot may look there, in degrees.
+/// The largest allowed error of the heading there, in degrees.
 const LOOK_DEG: f64 = 15.0;
 
 /// A warehouse with these products, numbered from 1.
@@ -29,7 +30,7 @@ pub(crate) fn warehouse(
     size: (u8, u8),
     delivery: (u8, u8),
     side_cm: u16,
-    products: &[(u8, u8, Side)],
+    products: &[(u8, u8, Heading)],
 ) -> WarehouseMap {
     let mut map = WarehouseMap {
         width: size.0,
@@ -53,15 +54,15 @@ pub(crate) fn warehouse(
 }
 
 /// The four sides.
-pub(crate) const SIDES: [Side; 4] = [Side::Left, Side::Up, Side::Right, Side::Down];
+pub(crate) const SIDES: [Heading; 4] = [Heading::Left, Heading::Up, Heading::Right, Heading::Down];
 
-/// The corners a delivery can be at.
+/// The corners at which the delivery can be.
 pub(crate) fn corners(size: (u8, u8)) -> [(u8, u8); 4] {
     [(0, 0), (0, size.1), (size.0, 0), (size.0, size.1)]
 }
 
-/// So many random missions, or as many as `LAGER_MISSIONS` says: the same ones each time, the first
-/// of a longer run among them.
+/// The number of random missions: `cases`, or `LAGER_MISSIONS` if it is set. The missions are the
+/// same each time; a longer run begins with those of a shorter one.
 pub(crate) fn missions(cases: u32) -> ProptestConfig {
     let wanted = std::env::var("LAGER_MISSIONS").ok();
     ProptestConfig {
@@ -72,7 +73,7 @@ pub(crate) fn missions(cases: u32) -> ProptestConfig {
     }
 }
 
-/// Whether a status has to go out at once: anything but what changes all the time is another.
+/// Whether the status must go out at once: more has changed than the values that always change.
 fn is_news(before: &NavigatorStatus, after: &NavigatorStatus) -> bool {
     let steady = |status: &NavigatorStatus| NavigatorStatus {
         frames: 0,
@@ -85,7 +86,7 @@ fn is_news(before: &NavigatorStatus, after: &NavigatorStatus) -> bool {
     steady(before) != steady(after)
 }
 
-/// One robot, its navigator and what has happened.
+/// One robot with its navigator, and what has happened so far.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
     config: LogicConfig,
@@ -100,7 +101,7 @@ pub(crate) struct Trial {
     pub(crate) events: Vec<(EventKind, u32, Node)>,
     pub(crate) thoughts: Vec<String>,
     pub(crate) blocks: BlockedWays,
-    /// The orders, as published.
+    /// The orders in their published form.
     pub(crate) queue: OrderQueue,
     picking_since: Option<Duration>,
     pub(crate) dead: bool,
@@ -140,7 +141,7 @@ impl Trial {
         trial
     }
 
-    /// What a navigator is told by retained topics when it starts.
+    /// Gives a new navigator its first inputs, those of the retained topics.
     fn introduce(&mut self) {
         let published = self.published;
         self.tell(Input::Map(&published));
@@ -162,7 +163,27 @@ impl Trial {
         self.tell(Input::Order(&Order { id, product }));
     }
 
-    /// One input, and what the shell does after it.
+    /// A person presses a button for the order or the product `number`; 0 = for none.
+    pub(crate) fn press(&mut self, kind: InputKind, number: u32) {
+        self.tell(Input::Operator(&lager_topics::Input {
+            kind: kind.into(),
+            order_id: number,
+            ..lager_topics::Input::default()
+        }));
+    }
+
+    /// A person presses a button for a node and a heading.
+    pub(crate) fn press_at(&mut self, kind: InputKind, (x, y): (u8, u8), heading: Heading) {
+        self.tell(Input::Operator(&lager_topics::Input {
+            kind: kind.into(),
+            x,
+            y,
+            heading: heading.into(),
+            ..lager_topics::Input::default()
+        }));
+    }
+
+    /// Gives the navigator one input, and does what the shell does after it.
     pub(crate) fn tell(&mut self, input: Input<'_>) {
         let now = self.body.now;
         let Output {
@@ -207,7 +228,7 @@ impl Trial {
         }
     }
 
-    /// 5 ms of robot time.
+    /// Runs for one step, 5 ms of robot time.
     pub(crate) fn step(&mut self) {
         let frame = self.body.step();
         if self.dead {
@@ -229,7 +250,7 @@ impl Trial {
         self.pick();
     }
 
-    /// The operator signals some time after the robot has come to the goods, again and again.
+    /// Some time after the robot has come to the goods, the operator presses "picked" repeatedly.
     fn pick(&mut self) {
         if self.status.phase != Phase::Picking || self.config.pick == Pick::Auto {
             self.picking_since = None;
@@ -238,20 +259,17 @@ impl Trial {
         let since = *self.picking_since.get_or_insert(self.body.now);
         if self.body.now >= since + PICKING {
             let order_id = self.status.order_id;
-            self.tell(Input::PickupDone {
-                order_id,
-                forced: false,
-            });
+            self.press(InputKind::PickupDone, order_id);
         }
     }
 
-    /// Kills the navigator, lets the robot do what it does without for `outage`, and starts the
-    /// next one from the last status.
+    /// Kills the navigator, lets the robot go on without it for `outage`, and starts the next one
+    /// from the last status.
     pub(crate) fn kill(&mut self, outage: Duration) {
         self.kill_and_introduce_late(outage, Duration::ZERO);
     }
 
-    /// The same, and the next one gets its frames before it is told the map and who may drive.
+    /// The same, but the next navigator gets frames before map and mode.
     pub(crate) fn kill_and_introduce_late(&mut self, outage: Duration, late: Duration) {
         self.dead = true;
         self.run_for(outage);
@@ -269,7 +287,7 @@ impl Trial {
         }
     }
 
-    /// Runs until `done` or until `limit` has passed; says whether it came to `done`.
+    /// Runs until `done` or until `limit` has passed; returns whether it reached `done`.
     pub(crate) fn run_until(&mut self, limit: Duration, done: impl Fn(&Self) -> bool) -> bool {
         let end = self.body.now + limit;
         while self.body.now < end {
@@ -289,8 +307,8 @@ impl Trial {
         self.phase() == Phase::WaitingForOrder && self.navigator.status().waiting == 0
     }
 
-    /// Runs until `count` products are delivered and the robot is back; panics with its thoughts
-    /// if that does not come about or the robot is not where it believes to be.
+    /// Runs until `count` products are delivered and the robot is back. Panics with its thoughts if
+    /// that does not happen, or if the robot is not where it believes to be.
     pub(crate) fn deliver(&mut self, count: u32) {
         let limit = Duration::from_secs(400) * count.max(1);
         let done = self.run_until(limit, |trial| {
@@ -299,12 +317,12 @@ impl Trial {
         assert!(done && self.phase() != Phase::Stuck, "{}", self.story());
         self.run_for(STEP * 100);
         let map = self.map();
-        self.assert_at(self.place(map.delivery()));
-        self.assert_looks(map.exit(), 180.0);
+        self.assert_at(self.place(map.grid.delivery()));
+        self.assert_looks(map.grid.exit(), 180.0);
     }
 
-    /// Runs until `count` products are delivered and the robot is back, with so many orders that
-    /// wait for a way.
+    /// Runs until `count` products are delivered and the robot is back, while `waiting` orders
+    /// still wait for a way.
     pub(crate) fn deliver_but(&mut self, count: u32, waiting: u8) {
         let done = self.run_until(Duration::from_secs(400) * count, |trial| {
             let status = trial.navigator.status();
@@ -329,7 +347,7 @@ impl Trial {
                 let map = self.map();
                 let product = self.navigator.status().product;
                 let station = map.station(product).unwrap();
-                let [first, second] = station.ends.map(|end| self.place(end));
+                let [first, second] = station.edge.ends().map(|end| self.place(end));
                 self.assert_at(((first.0 + second.0) / 2.0, (first.1 + second.1) / 2.0));
                 self.assert_looks(station.into, 0.0);
             }
@@ -354,7 +372,7 @@ impl Trial {
         );
     }
 
-    fn assert_looks(&self, heading: lager_topics::Heading, turned: f64) {
+    fn assert_looks(&self, heading: lager_floor::Heading, turned: f64) {
         let off = (self.body.degrees_off(heading) - turned).abs();
         assert!(
             off < LOOK_DEG,
@@ -363,7 +381,7 @@ impl Trial {
         );
     }
 
-    /// What the robot thought, for a failed test.
+    /// The robot's thoughts, for the message of a failed test.
     pub(crate) fn story(&self) -> String {
         format!(
             "at {:?} ({:.0}, {:.0}) looking {:.0}: {:#?}\n{:#?}",
@@ -376,7 +394,7 @@ impl Trial {
         )
     }
 
-    /// How often an event was announced.
+    /// The number of events of one kind.
     pub(crate) fn count(&self, wanted: EventKind) -> usize {
         self.events
             .iter()

@@ -1,12 +1,10 @@
-//! Ways that are blocked and opened at run time, and what is published with its time.
+//! Tests of ways that people block and open during a mission, and of the published blocks.
 
 use std::time::Duration;
 
+use lager_floor::Heading;
 use lager_logic::Input;
-use lager_logic::node::Node;
-use lager_topics::{
-    BlockSource, EventKind, FailureKind, Heading, Phase, Remedy, Side, WarehouseMap,
-};
+use lager_topics::{EventKind, FailureKind, InputKind, Phase, Remedy, WarehouseMap};
 
 use crate::double::Trouble;
 use crate::floor::Exit;
@@ -15,7 +13,7 @@ use crate::trial::{Trial, warehouse};
 const SECOND: Duration = Duration::from_secs(1);
 
 fn floor() -> WarehouseMap {
-    warehouse((2, 1), (0, 0), 45, &[(1, 0, Side::Right)])
+    warehouse((2, 1), (0, 0), 45, &[(1, 0, Heading::Right)])
 }
 
 fn mission() -> Trial {
@@ -24,12 +22,11 @@ fn mission() -> Trial {
 
 /// Blocks the way from a node, or opens it.
 fn way(trial: &mut Trial, (x, y): (u8, u8), heading: Heading, open: bool) {
-    trial.tell(Input::Way {
-        node: Node::new(x, y),
-        heading,
-        open,
-        source: BlockSource::Person,
-    });
+    let kind = match open {
+        true => InputKind::WayOpened,
+        false => InputKind::WayBlocked,
+    };
+    trial.press_at(kind, (x, y), heading);
 }
 
 #[test]
@@ -63,7 +60,7 @@ fn a_changed_list_of_products_clears_no_block() {
 fn who_finds_no_way_says_so_and_goes_on_when_one_is_open() {
     let mut trial = mission();
     trial.order(1, 1);
-    // Behind the robot and ahead of it, while it drives along the lower edge.
+    // One way behind the robot and one ahead of it, while it drives along the lower edge.
     trial.run_for(SECOND);
     for (node, heading) in [((1, 0), Heading::Right), ((1, 1), Heading::Right)] {
         way(&mut trial, node, heading, false);

@@ -1,19 +1,23 @@
-//! The bus end of `lager top`: reads the topics that the model wants, and looks who is on them.
+//! Connects `lager top` to the bus: reads the topics that the model wants, and finds out who writes
+//! and reads each.
 //!
-//! A row that is closed or filtered out has no subscription; of it only the bus is asked, which
-//! knows its ends. The head takes four states of the robot and the stop word.
+//! A row that is closed or filtered out has no subscription. Its writers and readers come from the
+//! bus's own lists. The head needs four states of the robot, and the stop word.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use lager_home::{BusWatch, Clock};
 use lager_ports::{
-    Bus, BusWatch, Clock, NodeInfo, NodeState, PortError, ReceiveError, Source, StopPage, StopWord,
-    Subscriber, TopicInfo, Watchdog,
+    Bus, NodeInfo, NodeState, PortError, ReceiveError, Source, Subscriber, TopicInfo,
 };
+use lager_sample::Topic;
+use lager_stop::{StopPage, StopWord};
 use lager_topics::{
-    LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Topic, TopicVisitor, visit,
+    LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, TopicVisitor, visit,
 };
+use lager_wake::Watchdog;
 
 use super::head::{Failing, Load};
 use super::model::Model;
@@ -21,13 +25,13 @@ use super::row::Life;
 use crate::ToolError;
 use crate::source::Stamped;
 
-/// Samples that are taken of one topic in one look.
+/// How many samples of one topic are taken in one look.
 const TURN: u64 = 1_024;
 
-/// The services that write a sign of life because nothing on the bus tells it.
+/// The services that write a sign of life, because nothing on the bus shows that they live.
 const SIGNING: [&str; 3] = ["comm", "station", "gateway"];
 
-/// What reads a robot's bus.
+/// Reads a robot's bus.
 pub(crate) struct Feed<'a> {
     bus: &'a Bus,
     watchdog: &'a Watchdog,
@@ -48,10 +52,10 @@ pub(crate) struct Feed<'a> {
 }
 
 impl<'a> Feed<'a> {
-    /// Joins the states of the head.
+    /// Opens the four states of the head.
     ///
     /// # Errors
-    /// Too many observers, or a process of another build.
+    /// There are too many observers, or a process of another build.
     pub(crate) fn new(bus: &'a Bus, watchdog: &'a Watchdog) -> Result<Self, ToolError> {
         let open = || -> Result<Self, PortError> {
             let clock = bus.clock();
@@ -75,21 +79,21 @@ impl<'a> Feed<'a> {
         Ok(watchdog.over("opening the topics", open)?)
     }
 
-    /// Looks who is on the topics, and reads those that the model wants.
+    /// Finds out who writes and reads the topics, and reads those that the model wants.
     pub(crate) fn look(&mut self, model: &mut Model) -> Result<(), ToolError> {
         let bus = self.bus;
-        // Both, so that each knows what is there now.
-        let is_other = self.services.has_changed(bus.place()) | self.ports.has_changed(bus.place());
+        // Update both, so that each is of this moment.
+        let is_other = self.services.has_changed(bus.home()) | self.ports.has_changed(bus.home());
         let ends = match self.ends.take().filter(Ends::writers_are_there) {
             Some(ends) if !is_other => ends,
-            // It takes a core for tens of milliseconds, which the robot's path would feel.
+            // This keeps a core busy for tens of milliseconds, which the robot's path would feel.
             _ => Ends::look(bus, self.watchdog)?,
         };
         model.take_ends(&ends.topics, |pid| ends.life(pid));
         model.head.failing = failing(bus, &ends.nodes);
         self.ends = Some(ends);
         self.refused.clear();
-        let word = bus.place().robot(bus.robot()).join(StopPage::FILE);
+        let word = bus.home().unit(bus.unit()).join(StopPage::FILE);
         let told = StopWord::read(&word).ok().flatten();
         model.head.stop = told.and_then(|told| told.stop());
         model.head.load = load();
@@ -103,7 +107,7 @@ impl<'a> Feed<'a> {
         self.follow(model)
     }
 
-    /// Opens what the model wants and closes the rest.
+    /// Opens the topics that the model wants, and closes the others.
     pub(crate) fn follow(&mut self, model: &mut Model) -> Result<(), ToolError> {
         let wanted: BTreeSet<String> = model.wanted().map(str::to_owned).collect();
         self.open.retain(|name, _| {
@@ -136,7 +140,7 @@ impl<'a> Feed<'a> {
         Ok(())
     }
 
-    /// Takes what has come.
+    /// Takes the new samples.
     pub(crate) fn drain(&mut self, model: &mut Model) -> Result<(), ToolError> {
         self.watchdog.enter("reading the topics");
         let drained = self.drain_all(model);
@@ -215,7 +219,7 @@ impl TopicVisitor for Open<'_> {
     }
 }
 
-/// Who is on the topics, as it was at one look.
+/// The programs that write and read the topics, at one moment.
 struct Ends {
     topics: Vec<TopicInfo>,
     nodes: Vec<NodeInfo>,
@@ -224,15 +228,15 @@ struct Ends {
 impl Ends {
     fn look(bus: &Bus, watchdog: &Watchdog) -> Result<Self, ToolError> {
         let mut topics = watchdog.over("looking at the topics", || bus.topics())?;
-        topics.retain(|topic| topic.robot == *bus.robot());
+        topics.retain(|topic| topic.unit == *bus.unit());
         Ok(Self {
             topics,
             nodes: watchdog.over("looking at the processes", || bus.nodes())?,
         })
     }
 
-    /// Whether no writer has gone since the look. One that was killed has its ports until it is
-    /// swept.
+    /// Whether all writers of that moment still live. A killed one keeps its ports until somebody
+    /// sweeps the bus.
     fn writers_are_there(&self) -> bool {
         let mut writers = self.topics.iter().flat_map(|topic| &topic.writers);
         let is_there = |pid: u32| pid == 0 || Path::new("/proc").join(pid.to_string()).exists();
@@ -248,9 +252,9 @@ impl Ends {
     }
 }
 
-/// The processes of the robot, its tools among them, that do not go on.
+/// The processes of the robot and of its tools that stand still.
 fn failing(bus: &Bus, nodes: &[NodeInfo]) -> Vec<Failing> {
-    let (place, robot) = (bus.place(), bus.robot());
+    let (place, robot) = (bus.home(), bus.unit());
     let mut found: Vec<Failing> = Vec::new();
     let mut add = |who: &str, pid: u32, silent: Option<Duration>| {
         if found.iter().all(|failing| failing.pid != pid) {
@@ -277,17 +281,17 @@ fn failing(bus: &Bus, nodes: &[NodeInfo]) -> Vec<Failing> {
         }
     }
     for node in nodes {
-        if node.robot.as_ref() == Some(robot)
-            && let Some(role) = node.role
+        if node.unit.as_ref() == Some(robot)
+            && let Some(part) = &node.part
             && life(node.pid) == Life::Frozen
         {
-            add(&role.to_string(), node.pid, None);
+            add(part, node.pid, None);
         }
     }
     found
 }
 
-/// Whether a process goes on, as the kernel has it.
+/// Whether a process runs, as the kernel says.
 fn life(pid: u32) -> Life {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
     // The state follows the name, which is in parentheses and may contain anything.
@@ -302,7 +306,7 @@ fn life(pid: u32) -> Life {
     }
 }
 
-/// What the machine does.
+/// The load of the machine.
 fn load() -> Load {
     let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let minute = text.split(' ').next().and_then(|text| text.parse().ok());

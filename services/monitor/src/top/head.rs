@@ -1,31 +1,32 @@
-//! The head of `lager top`: links, mode, stop, mission, load and the path's latencies, from the
-//! samples of four states and the stop word.
+//! The head of `lager top`: links, mode, stop, mission, load, and the latencies of the path. They
+//! come from the samples of four states and from the stop word.
 
 use std::time::Duration;
 
-use lager_ports::{Stop, called};
+use lager_sample::Stamp;
+use lager_stop::Stop;
 use lager_topics::{
     BoardHealth, CommandLatency, Durations, Health, Hold, NavigatorStatus, OrderQueue, PathLatency,
-    Stamp,
+    called,
 };
 use serde_json::{Value, json};
 
-/// What the machine does beside.
+/// The load of the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Load {
-    /// Processes that want a core, as the mean of a minute.
+    /// How many processes want a core, on average over a minute.
     pub(crate) minute: f64,
     /// Cores.
     pub(crate) cores: usize,
 }
 
-/// A process of the robot that does not go on.
+/// A process of the robot that stands still.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Failing {
-    /// Its role, or what it is called on the command line.
+    /// Its role, or its name on the command line.
     pub(crate) who: String,
     pub(crate) pid: u32,
-    /// For how long it has given no sign of life; `None` if it is frozen.
+    /// How long it has given no sign of life; `None` if it is frozen.
     pub(crate) silent: Option<Duration>,
 }
 
@@ -45,7 +46,7 @@ impl Failing {
     }
 }
 
-/// What the head shows.
+/// The content of the head.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Head {
     pub(crate) robot: String,
@@ -54,20 +55,21 @@ pub(crate) struct Head {
     heard_ns: [Option<u64>; 2],
     pub(crate) status: Option<NavigatorStatus>,
     pub(crate) queue: Option<OrderQueue>,
-    /// The ways of frames to decisions, and of orders to the wire.
+    /// The latencies from frames to decisions, and from orders to the wire.
     pub(crate) path: Recent<PathLatency>,
     pub(crate) command: Recent<CommandLatency>,
-    /// The stop that is set, as its word says; `None` if none is or the word cannot be read.
+    /// The stop that is set, from the stop word; `None` if there is none or the word cannot be
+    /// read.
     pub(crate) stop: Option<Stop>,
-    /// The processes of the robot that do not go on.
+    /// The processes of the robot that stand still.
     pub(crate) failing: Vec<Failing>,
     pub(crate) load: Load,
-    /// Robot seconds a second.
+    /// Seconds of robot time in a second.
     pub(crate) pace: Option<f64>,
 }
 
 impl Head {
-    /// Takes a state of the links as of that moment.
+    /// Takes a state of the links, published at that moment.
     pub(crate) fn take_health(&mut self, health: Health, at_ns: u64) {
         let boards = |health: &Health| [health.sensor, health.steering];
         let known = self.health.as_ref().map(boards);
@@ -81,7 +83,7 @@ impl Head {
         self.health = Some(health);
     }
 
-    /// Robot seconds a second, as they are shown.
+    /// Seconds of robot time in a second, as text.
     pub(crate) fn shown_pace(&self) -> Option<f64> {
         self.pace.map(|pace| (pace * 100.0).round() / 100.0)
     }
@@ -93,7 +95,7 @@ impl Head {
         })
     }
 
-    /// Who has stopped the robot and why, in words.
+    /// Who has stopped the robot, and why, in words.
     pub(crate) fn stopped(&self, now_ns: u64) -> Option<String> {
         if let Some(stop) = self.stop {
             let age = Duration::from_nanos(now_ns.saturating_sub(stop.at_ns()));
@@ -149,7 +151,7 @@ impl Head {
         text
     }
 
-    /// For programs.
+    /// The same for programs.
     pub(crate) fn as_json(&self, now_ns: u64) -> Value {
         let link = |place: usize| {
             let health = self.health.as_ref()?;
@@ -189,16 +191,17 @@ impl Head {
     }
 }
 
-/// What is shown of counts that only grow in each life of their writer: of a robot what was counted
-/// between the last two samples, of a recording all of it.
+/// Counts that only grow while their writer lives. For a robot the head shows what was counted
+/// between the last two samples, for a recording all of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Recent<T> {
     spans: Vec<Span<T>>,
-    /// The process and epoch that wrote the last sample of a recording.
+    /// The process and epoch of the last sample's writer, in a recording.
     life: Option<(u32, u64)>,
 }
 
-/// Counts, and those that were there before; none if all of them count.
+/// The last counts, and the counts before them. No earlier counts mean that all of the last ones
+/// count.
 #[derive(Clone, Debug)]
 struct Span<T> {
     before: Option<T>,
@@ -215,13 +218,13 @@ impl<T> Default for Recent<T> {
 }
 
 impl<T: Copy> Recent<T> {
-    /// A sample of a robot.
+    /// Takes a sample of a robot.
     pub(crate) fn take(&mut self, now: T) {
         let before = self.spans.pop().map(|span| span.now);
         self.spans = vec![Span { before, now }];
     }
 
-    /// A sample of a recording that began at that moment.
+    /// Takes a sample of a recording that began at that moment.
     pub(crate) fn take_recorded(&mut self, now: T, stamp: &Stamp, begun_ns: u64) {
         let life = (stamp.writer, stamp.epoch);
         if self.life == Some(life)
@@ -231,7 +234,7 @@ impl<T: Copy> Recent<T> {
             return;
         }
         self.life = Some(life);
-        // What an older writer had counted by then happened before the recording.
+        // A writer that is older than the recording counted these before it began.
         let before = (stamp.epoch < begun_ns).then_some(now);
         self.spans.push(Span { before, now });
     }
@@ -245,7 +248,7 @@ impl<T: Copy> Recent<T> {
     }
 }
 
-/// Both together.
+/// The sum of both.
 fn joined(mut one: Durations, other: Durations) -> Durations {
     one.count += other.count;
     one.sum_ns = one.sum_ns.saturating_add(other.sum_ns);
@@ -257,13 +260,13 @@ fn joined(mut one: Durations, other: Durations) -> Durations {
 }
 
 impl Head {
-    /// Whether anything is known of the path.
+    /// Whether the path has any figures.
     pub(crate) fn has_path(&self) -> bool {
         !self.path.spans.is_empty() || !self.command.spans.is_empty()
     }
 
-    /// The stages of the path in their order, by name: frames to their decision, and orders to the
-    /// wire. The last one is all of it.
+    /// The stages of the path in their order, by name: from frames to their decision, and from
+    /// orders to the wire. The last stage of each is the whole way.
     pub(crate) fn stages(&self) -> [(&'static str, Durations); 7] {
         [
             ("read", self.path.of(|path| &path.read_publish)),
@@ -277,8 +280,8 @@ impl Head {
     }
 }
 
-/// Shares of a stage's durations on a logarithmic scale of times. Within a bucket they are taken as
-/// even.
+/// How a stage's durations are spread over a logarithmic scale of times. Within a bucket they count
+/// as evenly spread.
 pub(crate) fn shares<const N: usize>(stage: &Durations, from_ns: f64, to_ns: f64) -> [f64; N] {
     let mut shares = [0.0; N];
     if stage.count == 0 {
@@ -296,7 +299,7 @@ pub(crate) fn shares<const N: usize>(stage: &Durations, from_ns: f64, to_ns: f64
         let (from, to) = (at(lower_ns), at(upper_ns));
         lower_ns = upper_ns;
         if to - from < 1e-6 {
-            // All of it lies beyond one end of the scale.
+            // The whole bucket lies beyond one end of the scale.
             shares[(from as usize).min(N - 1)] += share;
             continue;
         }

@@ -6,10 +6,11 @@
 //!   keys ───────────┘
 //! ```
 //!
-//! [`model`] and [`render`] are pure; `feed` reads the bus and this file the terminal. It is an
-//! observer like the other tools and looks at the queues every 5 ms. What a row that is not shown
-//! would tell is not read; the figures come from stamps, so no payload is looked at but those of
-//! the head.
+//! [`model`] and [`render`] are pure. `feed` reads the bus, and this file reads the terminal.
+//! `lager top` is an observer like the other tools, and looks at the queues every 5 ms. It does not
+//! read topics whose rows are not shown. Its figures come from stamps; it reads only the payloads
+//! that the head needs.
+//! that the head needs.
 
 mod feed;
 mod head;
@@ -21,10 +22,10 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Shutdown, urgency};
-use lager_topics::{
-    Description, LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Stamp, Topic,
-};
+use lager_home::Clock;
+use lager_sample::{Description, Stamp, Topic};
+use lager_topics::{LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus};
+use lager_wake::{Shutdown, urgency};
 use ratatui::DefaultTerminal;
 use ratatui::buffer::Buffer;
 use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, poll, read};
@@ -37,9 +38,9 @@ use self::feed::Feed;
 use self::model::{Key, Model, Pressed};
 use crate::{POLL, ToolError, Tools};
 
-/// How long one window of figures is, how often the ends are looked at, and how often it is drawn.
+/// The length of a window of figures, and how often it asks for writers and readers, and draws.
 const WINDOW: Duration = Duration::from_secs(1);
-/// The picture of `--once`.
+/// The size of the picture of `--once`.
 const ONCE: Rect = Rect::new(0, 0, 200, 200);
 
 /// What `lager top` shows first.
@@ -47,17 +48,17 @@ const ONCE: Rect = Rect::new(0, 0, 200, 200);
 pub struct TopConfig {
     /// Only topics whose names contain this.
     pub filter: String,
-    /// Print what so long a time tells, and end.
+    /// Measure for this time, print one picture, and end.
     pub once: Option<Duration>,
 }
 
 impl<W: Write> Tools<'_, W> {
-    /// `lager top` on the bus, until a key, the shutdown, or the end of its one picture.
+    /// `lager top` on the bus. A key, the shutdown, or its one picture ends it.
     ///
     /// # Errors
     /// The bus cannot be read, or the terminal cannot be used.
     pub fn top(&mut self, config: &TopConfig) -> Result<(), ToolError> {
-        let mut model = Model::new(self.bus.robot().as_str());
+        let mut model = Model::new(self.bus.unit().as_str());
         model.view.filter.clone_from(&config.filter);
         urgency::wake_with_others(POLL);
         let mut feed = Feed::new(self.bus, self.watchdog)?;
@@ -117,26 +118,26 @@ impl<W: Write> Tools<'_, W> {
     }
 }
 
-/// How many samples of a topic a recording lacks up to one that it has.
+/// How many samples of a topic are missing in a recording, up to one that it has.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Lacking {
-    /// They were lost before the recorder.
+    /// They were overwritten before the recorder read them.
     pub lost: u64,
-    /// The recorder had no time for them.
+    /// The recorder dropped them, because its disk was too slow.
     pub dropped: u64,
 }
 
-/// A recording, sample by sample, and then its table. The figures are those of all of it.
+/// A recording: takes its samples one by one, and then shows the table of all of them.
 #[derive(Debug)]
 pub struct Recorded {
     model: Model,
     begun_ns: Option<u64>,
-    /// What each topic lacked up to its last sample.
+    /// How many samples of each topic were missing up to its last one.
     lacking: BTreeMap<String, Lacking>,
 }
 
 impl Recorded {
-    /// Of a file of that name and robot.
+    /// For a file of this name and robot.
     #[must_use]
     pub fn new(file: &str, robot: &str, filter: &str) -> Self {
         let mut model = Model::new(robot);
@@ -149,7 +150,7 @@ impl Recorded {
         }
     }
 
-    /// Takes a sample: its stamp, how many of its topic are lacking up to it, and its payload.
+    /// Takes a sample: its stamp, how many of its topic are missing up to it, and its payload.
     pub fn take(&mut self, topic: &str, stamp: &Stamp, lacking: Lacking, payload: Value) {
         let published = stamp.publish_time_ns;
         let begun_ns = *self.begun_ns.get_or_insert(published);
@@ -164,8 +165,8 @@ impl Recorded {
         self.show_state(topic, stamp, begun_ns, payload);
     }
 
-    /// Takes a state that was told before the file began. It says how things stood, and is no
-    /// sample of the file.
+    /// Takes a state from before the file. It shows how things were, and does not count as a sample
+    /// of the file.
     pub fn repeat(&mut self, topic: &str, stamp: &Stamp, payload: Value) {
         self.show_state(topic, stamp, stamp.publish_time_ns, payload);
     }
@@ -195,7 +196,7 @@ impl Recorded {
         }
     }
 
-    /// Takes how a topic's samples lie, by which rates are told in bytes.
+    /// Takes a topic's layout, which gives the sizes for rates in bytes.
     pub fn describe(&mut self, topic: &str, layout: &Description) {
         self.model.row(topic).lies_like(layout);
     }
@@ -234,7 +235,7 @@ impl Recorded {
     }
 }
 
-/// A payload as its type; `None` if another build wrote it.
+/// The payload as its type; `None` if another build wrote it.
 fn of<P: for<'de> Deserialize<'de>>(payload: Value) -> Option<P> {
     P::deserialize(payload.into_deserializer()).ok()
 }
@@ -254,14 +255,14 @@ fn print(model: &Model, as_json: bool, out: &mut impl Write) -> io::Result<()> {
     writeln!(out)
 }
 
-/// What a person does at the terminal.
+/// What the person at the terminal does.
 enum Stroke {
     Key(Key),
     Resized,
     Leave,
 }
 
-/// The terminal while it is a screen; given back when this is dropped.
+/// The terminal as a screen. Dropping it gives the terminal back.
 struct Screen(DefaultTerminal);
 
 impl Screen {
@@ -277,7 +278,7 @@ impl Screen {
         Ok(())
     }
 
-    /// What is done within `patience`.
+    /// The person's next action within `patience`.
     fn key(&mut self, patience: Duration) -> io::Result<Option<Stroke>> {
         if !poll(patience)? {
             return Ok(None);
@@ -296,7 +297,7 @@ impl Drop for Screen {
     }
 }
 
-/// Gives the terminal back if a picture is on it; for a process that ends at once.
+/// Gives the terminal back if it shows a picture; for a process that ends at once.
 pub fn leave_screen() {
     if ratatui::crossterm::terminal::is_raw_mode_enabled().unwrap_or(false) {
         ratatui::restore();
@@ -305,7 +306,7 @@ pub fn leave_screen() {
 
 fn stroke(key: KeyEvent) -> Option<Stroke> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {
-        // In this mode the terminal makes no signal of it.
+        // In this mode the terminal makes no signal of Ctrl-C.
         return matches!(key.code, KeyCode::Char('c')).then_some(Stroke::Leave);
     }
     let key = match key.code {

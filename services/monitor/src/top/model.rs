@@ -1,10 +1,11 @@
-//! What `lager top` knows and how it is looked at. Pure: samples, ends, keys and times go in; rows
-//! in an order, and which topics are to be read, come out.
+//! The model of `lager top`. It is pure: samples, writers, readers, keys and times go in; sorted
+//! rows and the list of topics to read come out.
 
 use std::collections::BTreeMap;
 
 use lager_ports::TopicInfo;
-use lager_topics::{Stamp, TOPICS};
+use lager_sample::Stamp;
+use lager_topics::TOPICS;
 use serde_json::{Value, json};
 
 use super::head::Head;
@@ -13,7 +14,7 @@ use super::row::{Life, Row, Trouble};
 /// A little less than the first window of figures, in ns.
 const WINDOW_NS: u64 = 900_000_000;
 
-/// A key that means something here.
+/// A key that has a meaning here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Key {
     Char(char),
@@ -30,10 +31,10 @@ pub(crate) enum Key {
     Escape,
 }
 
-/// What rows are sorted by.
+/// How rows are sorted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Sort {
-    /// What is wrong comes first, and the rest in the table's order.
+    /// Topics in trouble first, then the table's order.
     #[default]
     Trouble,
     Name,
@@ -76,41 +77,41 @@ impl Sort {
     }
 }
 
-/// How it is looked at.
+/// The view: filter, order, and what is frozen.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct View {
     pub(crate) sort: Sort,
     pub(crate) is_reversed: bool,
     pub(crate) filter: String,
-    /// Whether letters go into the filter.
+    /// Whether typed letters go into the filter.
     pub(crate) is_typing: bool,
-    /// The picture stands, while everything is counted.
+    /// The picture does not change, but counting goes on.
     pub(crate) is_paused: bool,
-    /// Rows keep their places, while their figures change.
+    /// Rows keep their places while their figures change.
     pub(crate) is_frozen: bool,
     pub(crate) shows_help: bool,
-    /// Which page of columns is shown, where one has no room for all: from 0, and round again.
+    /// Which page of columns is shown if not all fit: from 0; after the last page the first one.
     pub(crate) page: isize,
-    /// Whether the path's stages are drawn; `None`: if there is room.
+    /// Whether to draw the path's stages; `None` draws them if they fit.
     pub(crate) shows_path: Option<bool>,
     /// The chosen row's topic.
     pub(crate) chosen: Option<String>,
 }
 
-/// What a key was for.
+/// What a key did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pressed {
     Quit,
     Taken,
 }
 
-/// Everything.
+/// The whole model.
 #[derive(Debug, Default)]
 pub(crate) struct Model {
     pub(crate) head: Head,
     pub(crate) view: View,
     pub(crate) now_ns: u64,
-    /// Where the samples come from, if not from a bus.
+    /// The source of the samples, if it is not a bus.
     pub(crate) file: Option<String>,
     /// When it began to look.
     begun_ns: Option<u64>,
@@ -126,7 +127,7 @@ impl Model {
         model
     }
 
-    /// The row of a topic, new if there was none.
+    /// The row of a topic; makes one if there is none.
     pub(crate) fn row(&mut self, name: &str) -> &mut Row {
         let new = || {
             let mut entries = TOPICS.iter().enumerate();
@@ -135,7 +136,7 @@ impl Model {
         self.rows.entry(name.to_owned()).or_insert_with(new)
     }
 
-    /// Takes who is on each topic of the robot now.
+    /// Takes the present writers and readers of each topic of the robot.
     pub(crate) fn take_ends(&mut self, topics: &[TopicInfo], life: impl Fn(u32) -> Life) {
         for topic in topics {
             self.row(&topic.name).take_ends(topic, &life);
@@ -152,7 +153,7 @@ impl Model {
         self.row(name).hear(stamp);
     }
 
-    /// Ends a window of all rows, and puts them in order.
+    /// Ends a window of all rows, and sorts them.
     pub(crate) fn end_window(&mut self, now_ns: u64) {
         self.now_ns = now_ns;
         self.begun_ns.get_or_insert(now_ns);
@@ -164,7 +165,7 @@ impl Model {
         self.arrange();
     }
 
-    /// All samples have come, and were a recording's.
+    /// All samples of a recording have come.
     pub(crate) fn end_recording(&mut self) {
         for row in self.rows.values_mut() {
             row.end_recording(self.now_ns);
@@ -172,7 +173,7 @@ impl Model {
         self.end_window(self.now_ns);
     }
 
-    /// Topics that are to be read: those of rows that are shown and open.
+    /// The topics to read: those whose rows are shown and open.
     pub(crate) fn wanted(&self) -> impl Iterator<Item = &str> {
         let rows = self.rows.values().filter(|row| self.is_read(row));
         rows.map(|row| row.name.as_str())
@@ -186,13 +187,13 @@ impl Model {
         row.name.contains(&self.view.filter)
     }
 
-    /// The rows that are shown, in order.
+    /// The rows to show, in order.
     pub(crate) fn shown(&self) -> Vec<&Row> {
         let rows = self.order.iter().filter_map(|name| self.rows.get(name));
         rows.filter(|row| self.passes(row)).collect()
     }
 
-    /// Puts the rows in order, unless they are frozen; new ones come last then.
+    /// Sorts the rows, unless they are frozen. Then new ones come last.
     pub(crate) fn arrange(&mut self) {
         let mut rows: Vec<&Row> = self.rows.values().collect();
         let now = self.now_ns;
@@ -219,7 +220,7 @@ impl Model {
         self.order = rows.into_iter().map(|row| row.name.clone()).collect();
     }
 
-    /// Whether it has not looked for long enough to know that all is well.
+    /// Whether it has looked for too short a time to know that all is well.
     pub(crate) fn is_looking(&self) -> bool {
         let since = |begun: u64| self.now_ns.saturating_sub(begun);
         self.file.is_none() && self.begun_ns.is_none_or(|begun| since(begun) < WINDOW_NS)
@@ -283,7 +284,8 @@ impl Model {
         }
     }
 
-    /// Opens or closes the chosen row. A closed one is not read, and counts nothing.
+    /// Opens or closes the chosen row. `top` does not read a closed topic, and counts nothing of
+    /// it.
     fn turn_over(&mut self) {
         let chosen = self.view.chosen.clone();
         let chosen = chosen.or_else(|| self.shown().first().map(|row| row.name.clone()));
@@ -305,7 +307,7 @@ impl Model {
         self.view.chosen = shown.get(at).map(|row| row.name.clone());
     }
 
-    /// For programs.
+    /// The same for programs.
     pub(crate) fn as_json(&self) -> Value {
         let rows = self.shown().into_iter().map(|row| row.as_json(self.now_ns));
         let mut value = self.head.as_json(self.now_ns);

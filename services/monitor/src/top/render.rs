@@ -1,4 +1,4 @@
-//! The screen of `lager top`: the model as text in a buffer, for any size from 80 x 24 on.
+//! The screen of `lager top`: draws the model as text in a buffer, for any size from 80 x 24.
 //!
 //! ```text
 //!  robot, mode, how many topics are in trouble, clock, load
@@ -16,23 +16,23 @@ use super::head::{shares, span};
 use super::model::{Model, Sort};
 use super::row::{Life, Row, Trouble};
 
-/// From this height on each stage of the path has a line.
+/// From this height on, each stage of the path has a line.
 const ROOMY: u16 = 40;
-/// Places of a histogram, from 10 us to 100 ms, eight for each power of ten.
+/// Columns of a histogram, from 10 us to 100 ms, eight for each power of ten.
 const PLACES: usize = 32;
 const LEAST_NS: f64 = 1e4;
 const MOST_NS: f64 = 1e8;
-/// Eight heights, and nothing.
+/// No bar, and eight heights of bars.
 const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 const HELP: &[&str] = &[
     "Up Down PgUp PgDn Home End   choose a row",
-    "Left Right                   other columns, where there is no room for all",
-    "Space Enter                  close it, or open it: a closed one is not read",
-    "+  -                         open, close all rows",
-    "/  F4                        filter: only what passes is read; Esc drops it",
-    "<  >  F6                     sort by the column before, behind",
-    "I                            turn the order round",
+    "Left Right                   other columns, if not all fit",
+    "Space Enter                  open or close it: top does not read closed ones",
+    "+  -                         open all rows, close all rows",
+    "/  F4                        filter: top reads only what passes; Esc clears it",
+    "<  >  F6                     sort by the previous column, by the next one",
+    "I                            reverse the order",
     "p  Z                         pause: the picture stands, counting goes on",
     "f                            freeze: rows keep their places",
     "l                            latencies of the path, stage by stage",
@@ -40,8 +40,8 @@ const HELP: &[&str] = &[
     "",
     "!  samples were lost in the last 30 s    x  its writer is dead or frozen",
     "~  less than half of what is expected    ?  cannot be read    -  closed",
-    "LOST counts what was lost on the way, SKIP what this screen was too late",
-    "for. QUEUE is how many samples waited at most.",
+    "LOST counts samples that were lost on the way, SKIP those that came too fast",
+    "for this screen. QUEUE is how many samples waited at most.",
 ];
 
 /// Draws everything.
@@ -126,7 +126,7 @@ fn head(model: &Model, page: &mut Page<'_>) {
             count(head.load.cores, "core")
         ),
     };
-    // Before it has looked for a while, what is not seen may be there.
+    // Before it has looked for a while, a topic may exist although it has not seen it.
     let known = |is_seen: bool, text: String| match is_seen || !model.is_looking() {
         true => text,
         false => "...".to_owned(),
@@ -173,8 +173,8 @@ fn head(model: &Model, page: &mut Page<'_>) {
     path(model, page);
 }
 
-/// The latencies of the last second, or of all of a recording: of frames to their decision, or with
-/// room each stage.
+/// The latencies of the last second, or of a whole recording: from frames to their decision, or
+/// each stage if there is room.
 fn path(model: &Model, page: &mut Page<'_>) {
     if !model.head.has_path() {
         return page.put("path      not measured", dim());
@@ -212,7 +212,7 @@ fn path(model: &Model, page: &mut Page<'_>) {
     }
 }
 
-/// Shares as bars, as high as they are frequent; a rare one is seen all the same.
+/// Shares as bars. A higher bar is more frequent, and even a rare one is visible.
 fn bars(shares: &[f64]) -> String {
     let most = shares.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let bar = |share: &f64| match *share {
@@ -222,10 +222,10 @@ fn bars(shares: &[f64]) -> String {
     shares.iter().map(bar).collect()
 }
 
-/// Letters for who writes a topic.
+/// Width of the column that names the writer.
 const WRITER: usize = 15;
 
-/// A column: its head, its width, what it shows, and what it sorts by.
+/// A column: its head, its width, its content, and its order.
 struct Column {
     head: &'static str,
     width: usize,
@@ -233,7 +233,7 @@ struct Column {
     cell: fn(&Row, u64) -> String,
 }
 
-/// In the order in which they stand. The ones with a lower rank are left out first.
+/// In their order on the screen. If not all fit, those with the lowest rank are left out first.
 const COLUMNS: &[(u8, Column)] = &[
     (
         9,
@@ -316,8 +316,8 @@ const fn column(
     }
 }
 
-/// Every column on pages that fit, by their places in [`COLUMNS`]: the most telling ones first, and
-/// the topic's name on each page.
+/// Divides the columns into pages that fit, by their places in [`COLUMNS`]. The columns with the
+/// highest rank come first, and each page has the topic's name.
 fn pages(width: usize) -> Vec<Vec<usize>> {
     let fits = |page: &[usize]| {
         let widths = page.iter().map(|at| COLUMNS[*at].1.width + 1);
@@ -329,7 +329,7 @@ fn pages(width: usize) -> Vec<Vec<usize>> {
         let mut page = vec![0];
         page.append(&mut left);
         while !fits(&page) && page.len() > 2 {
-            // The last one of the lowest rank.
+            // The last of those with the lowest rank.
             let others = page.iter().enumerate().skip(1).rev();
             let least = others.min_by_key(|(_, at)| COLUMNS[**at].0);
             let (place, _) = least.expect("there are two");
@@ -341,7 +341,7 @@ fn pages(width: usize) -> Vec<Vec<usize>> {
     pages
 }
 
-/// The columns of the page that is shown, in their order.
+/// The columns of the present page, in their order.
 fn fitting(model: &Model, width: usize) -> Vec<&'static Column> {
     let pages = pages(width);
     let shown = model.view.page.rem_euclid(pages.len() as isize);
@@ -411,7 +411,7 @@ fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
     }
 }
 
-/// Words begin at the left, and numbers end at the right.
+/// Words stand at the left of a column, numbers at its right.
 fn cell(text: &str, column: &Column) -> String {
     let width = column.width;
     let text: String = text.chars().take(width).collect();
@@ -425,7 +425,7 @@ fn writer(row: &Row) -> String {
     let Some(first) = row.author() else {
         return "-".to_owned();
     };
-    let role = match (first.role, first.life) {
+    let role = match (&first.role, first.life) {
         (Some(role), _) => role.to_string(),
         (None, Life::Recorded) => "process".to_owned(),
         (None, _) => "stranger".to_owned(),
@@ -434,7 +434,7 @@ fn writer(row: &Row) -> String {
         1 => String::new(),
         n => format!(" +{}", n - 1),
     };
-    // A long role is cut, since a process is known by its whole number only.
+    // A long role is cut, but never the number: only the whole number names the process.
     let process = format!(" {}{more}", first.pid);
     let room = WRITER.saturating_sub(process.len());
     role.chars().take(room).collect::<String>() + &process
@@ -453,7 +453,7 @@ fn readers(row: &Row) -> String {
     }
 }
 
-/// A figure of samples; there is none without samples.
+/// A figure that needs samples; empty without samples.
 fn measured(row: &Row, value: f64) -> String {
     match row.last_ns {
         Some(_) => number(value),

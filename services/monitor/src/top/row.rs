@@ -1,33 +1,34 @@
-//! One topic of `lager top`: what its stamps and its ends tell. Pure: times are arguments.
+//! One topic of `lager top`: the figures from its stamps, writers and readers. Pure: times are
+//! arguments.
 
 use std::time::Duration;
 
 use lager_ports::{Layout, TopicInfo};
-use lager_topics::{Description, Role, Stamp, TopicEntry};
+use lager_sample::{Description, Stamp, TopicEntry};
 use serde_json::{Value, json};
 
 use crate::delay::Stage;
 
-/// How long a loss stays in sight.
+/// How long a loss stays visible.
 const REMEMBERED: Duration = Duration::from_secs(30);
 /// A rate below this part of the expected one is too slow.
 const SLOW: f64 = 0.5;
-/// So long a topic with writers may be silent from when it is looked at, beside two periods of it.
+/// How long a topic with writers may be silent after `top` begins to read it, plus two periods.
 const FIRST_NS: u64 = 1_500_000_000;
-/// After so long without a sample there is no rate any more, in ns.
+/// After this time without a sample there is no rate any more, in ns.
 const SILENT_NS: u64 = 10_000_000_000;
 
-/// Whether a process that writes a topic goes on.
+/// Whether a process that writes a topic runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Life {
-    /// Nobody looks any more: it wrote a recording.
+    /// It wrote a recording; nobody checks it any more.
     Recorded,
-    /// It does.
+    /// It runs.
     #[default]
     Alive,
-    /// Somebody has stopped it.
+    /// A signal has frozen it.
     Frozen,
-    /// It was killed, and what it left is not swept yet.
+    /// Somebody killed it, and its ports are still on the bus.
     Dead,
 }
 
@@ -44,9 +45,9 @@ impl Life {
 }
 
 /// A process that writes the topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Author {
-    pub(crate) role: Option<Role>,
+    pub(crate) role: Option<String>,
     pub(crate) pid: u32,
     pub(crate) life: Life,
 }
@@ -55,7 +56,7 @@ pub(crate) struct Author {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Figures {
     pub(crate) hz: f64,
-    /// How far all but one in a hundred gaps between two samples are from the mean one.
+    /// How irregular the samples are: 99 % of the gaps differ from the mean gap by at most this.
     pub(crate) jitter_p99_ns: u64,
     pub(crate) bytes_per_s: f64,
     /// Most samples that waited for a look.
@@ -73,7 +74,7 @@ pub(crate) enum Trouble {
     Losing,
     /// Its writer is dead or frozen.
     Unwritten,
-    /// It comes far less often than it should.
+    /// It comes much less often than it should.
     Slow,
     /// Nothing.
     None,
@@ -83,25 +84,25 @@ pub(crate) enum Trouble {
 #[derive(Debug)]
 pub(crate) struct Row {
     pub(crate) name: String,
-    /// Its place in the table; behind all others for what is in no table.
+    /// Its place in the table. A topic that is not in the table comes after all others.
     pub(crate) place: usize,
-    /// Whether its samples are looked at.
+    /// Whether the tool reads its samples.
     pub(crate) is_open: bool,
     pub(crate) authors: Vec<Author>,
-    /// Subscribers; not known of a recording.
+    /// Subscribers; unknown for a recording.
     pub(crate) readers: Option<usize>,
-    /// Places for readers, where they are known.
+    /// Places for readers, if known.
     pub(crate) places: Option<usize>,
     /// Why its samples cannot be read.
     pub(crate) unread: Option<String>,
-    /// What a robot sends in a second of its own time, and in one of real time.
+    /// How many samples a robot sends in a second: of its own time, and of real time.
     usual_hz: Option<f64>,
     pub(crate) expected_hz: Option<f64>,
-    /// Of a sample, with its stamp; 0 = not known.
+    /// Bytes of a sample with its stamp; 0 = not known.
     bytes: usize,
-    /// Samples of which a reader is sure that they were lost.
+    /// Samples that were certainly lost on the way.
     pub(crate) lost: u64,
-    /// Samples that were overwritten in this process's own full queue.
+    /// Samples that were overwritten because `top` itself was too slow.
     pub(crate) overrun: u64,
     lost_at_ns: Option<u64>,
     pub(crate) samples: u64,
@@ -110,9 +111,9 @@ pub(crate) struct Row {
     last_writer: u32,
     pub(crate) figures: Figures,
     window: Window,
-    /// Whether a window with samples has ended: before that there are no figures.
+    /// Whether a window with samples has ended; before that there are no figures.
     is_measured: bool,
-    /// Since when it is read while somebody could write it.
+    /// Since when `top` reads it and somebody could write it.
     watched_ns: Option<u64>,
 }
 
@@ -156,7 +157,7 @@ impl Row {
         }
     }
 
-    /// Takes who writes and reads it now.
+    /// Takes the present writers and readers.
     pub(crate) fn take_ends(&mut self, info: &TopicInfo, life: impl Fn(u32) -> Life) {
         self.readers = Some(info.subscribers);
         if info.entry.is_none() {
@@ -172,25 +173,25 @@ impl Row {
             self.lies_like(description);
         }
         let authors = info.writers.iter().map(|peer| Author {
-            role: peer.role,
+            role: peer.part.clone(),
             pid: peer.pid,
             life: life(peer.pid),
         });
         self.authors = authors.collect();
     }
 
-    /// Takes how its samples lie.
+    /// Takes the layout of the samples.
     pub(crate) fn lies_like(&mut self, layout: &Description) {
         self.bytes = layout.size() + size_of::<Stamp>();
     }
 
-    /// Nobody is on it any more.
+    /// Nobody writes or reads it any more.
     pub(crate) fn leave(&mut self) {
         (self.authors, self.readers) = (Vec::new(), Some(0));
     }
 
-    /// Its samples were those of a recording up to that moment: of its ends only a stamp is left,
-    /// and what it lost at any time is to be seen.
+    /// Its samples were those of a recording, up to that moment. Only stamps tell of its writers,
+    /// and losses of any time stay visible.
     pub(crate) fn end_recording(&mut self, now_ns: u64) {
         self.authors = vec![Author {
             role: None,
@@ -200,7 +201,7 @@ impl Row {
         self.lost_at_ns = self.lost_at_ns.map(|_| now_ns);
     }
 
-    /// Takes how many seconds of the robot's time a second has.
+    /// Takes how many seconds of robot time a second has.
     pub(crate) fn take_pace(&mut self, pace: f64) {
         self.expected_hz = self.usual_hz.map(|hz| hz * pace);
     }
@@ -225,7 +226,7 @@ impl Row {
         self.last_writer = stamp.writer;
     }
 
-    /// Is not looked at for a while: what is known of rates and ages is void.
+    /// `top` does not read the topic for a while: forget its rates and ages.
     pub(crate) fn rest(&mut self) {
         self.last_ns = None;
         self.figures = Figures::default();
@@ -233,8 +234,8 @@ impl Row {
         (self.is_measured, self.watched_ns) = (false, None);
     }
 
-    /// Takes what one look has found in a queue for so many samples, and how many were lost before.
-    /// Losses while the queue was full are this process's own: it was late.
+    /// Takes how many samples a look found in a queue of this length, and how many were lost
+    /// before. Losses from a full queue are `top`'s own: it was too slow.
     pub(crate) fn look(&mut self, (found, queue): (u64, usize), lost: u64, now_ns: u64) {
         self.window.queue = self.window.queue.max(found);
         if lost == 0 {
@@ -247,15 +248,15 @@ impl Row {
         }
     }
 
-    /// Takes what a recording lacks before a sample: what was lost before its recorder, and what
-    /// that had no time for.
+    /// Takes the losses of a recording before a sample: those on the way to its recorder, and those
+    /// that the recorder dropped.
     pub(crate) fn lack(&mut self, lost: u64, dropped: u64, now_ns: u64) {
         if lost + dropped > 0 {
             self.lose(lost + dropped, now_ns);
         }
     }
 
-    /// Counts losses that are nobody's but the topic's.
+    /// Counts losses on the way.
     pub(crate) fn lose(&mut self, lost: u64, now_ns: u64) {
         self.lost += lost;
         self.lost_at_ns = Some(now_ns);
@@ -273,7 +274,7 @@ impl Row {
         let mut gaps = window.gaps;
         let hz = match (window.samples, window.before_ns) {
             (0, _) => {
-                // It may only be slow.
+                // The topic may only be slow.
                 let silent = now_ns.saturating_sub(last);
                 let at_most = 1e9 / silent.max(1) as f64;
                 match silent < SILENT_NS {
@@ -301,12 +302,12 @@ impl Row {
         };
     }
 
-    /// Bytes a second, where it is known how long a sample is.
+    /// Bytes a second, if the size of a sample is known.
     pub(crate) fn bytes_per_s(&self) -> Option<f64> {
         (self.bytes > 0).then_some(self.figures.bytes_per_s)
     }
 
-    /// The process that wrote last, or any that could.
+    /// The process that wrote last, or else any that could.
     pub(crate) fn author(&self) -> Option<&Author> {
         let wrote = |author: &&Author| author.pid == self.last_writer;
         let last = self.authors.iter().find(wrote);
@@ -344,7 +345,7 @@ impl Row {
         }
     }
 
-    /// Whether it should have come long since, from when it is looked at.
+    /// Whether a sample should have come long ago, since `top` reads the topic.
     fn is_silent(&self, expected: f64, now_ns: u64) -> bool {
         let watched = |since: u64| now_ns.saturating_sub(since) as f64;
         let patience = FIRST_NS as f64 + 2e9 / expected;
@@ -352,11 +353,11 @@ impl Row {
             .is_some_and(|since| watched(since) >= patience)
     }
 
-    /// For programs.
+    /// The same for programs.
     pub(crate) fn as_json(&self, now_ns: u64) -> Value {
         let authors = self.authors.iter().map(|author| {
             json!({
-                "role": author.role.map(|role| role.to_string()), "pid": author.pid,
+                "role": &author.role, "pid": author.pid,
                 "state": (author.life != Life::Recorded).then(|| author.life.name()),
             })
         });
@@ -378,7 +379,7 @@ impl Row {
     }
 }
 
-/// So many samples from one moment to another, as samples a second.
+/// This many samples between two moments, as samples a second.
 fn rate(samples: u64, from_ns: u64, to_ns: u64) -> f64 {
     match to_ns.saturating_sub(from_ns) {
         0 => 0.0,
@@ -454,7 +455,7 @@ mod tests {
     fn a_topic_whose_writers_are_gone_is_in_trouble() {
         let mut row = row("nav/map");
         let author = |life| Author {
-            role: Some(Role::Comm),
+            role: Some("comm".to_owned()),
             pid: 7,
             life,
         };
@@ -481,7 +482,7 @@ mod tests {
     fn nothing_is_slow_before_it_is_known_and_a_silent_writer_is_in_time() {
         let alive = |row: &mut Row| {
             row.authors = vec![Author {
-                role: Some(Role::Bridge),
+                role: Some("bridge".to_owned()),
                 pid: 7,
                 life: Life::Alive,
             }];

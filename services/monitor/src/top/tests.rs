@@ -6,10 +6,13 @@
 use std::path::Path;
 use std::time::Duration;
 
-use lager_ports::{Layout, Peer, RobotName, TopicInfo};
+use lager_home::UnitName;
+use lager_orders::Mode;
+use lager_ports::{Layout, Peer, TopicInfo};
+use lager_sample::{Description, Stamp};
 use lager_topics::{
-    CommandLatency, Description, Durations, Health, LineFrame, Mode, NavigatorStatus, OrderQueue,
-    PathLatency, Phase, Role, Stamp, StopCause, TOPICS,
+    CommandLatency, Durations, Health, LineFrame, NavigatorStatus, OrderQueue, PathLatency, Phase,
+    Role, StopCause, TOPICS,
 };
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -36,7 +39,7 @@ fn author(topic: &str) -> (Role, u32) {
 
 fn info(topic: &str, writers: Vec<Peer>) -> TopicInfo {
     TopicInfo {
-        robot: "r1".parse::<RobotName>().expect("a name"),
+        unit: "r1".parse::<UnitName>().expect("a name"),
         name: topic.to_owned(),
         entry: TOPICS.iter().find(|entry| entry.name == topic),
         layout: Layout::Ours,
@@ -51,6 +54,14 @@ fn info(topic: &str, writers: Vec<Peer>) -> TopicInfo {
     }
 }
 
+fn peer(role: Role, pid: u32) -> Peer {
+    Peer {
+        part: Some(role.to_string()),
+        pid,
+        observes: role.is_observer(),
+    }
+}
+
 /// A robot that drives, ten seconds after the start of time; `weather/now` loses one in five.
 fn driving() -> Model {
     let mut model = Model::new("r1");
@@ -58,12 +69,10 @@ fn driving() -> Model {
         .iter()
         .map(|entry| {
             let (role, pid) = author(entry.name);
-            let role = Some(role);
-            info(entry.name, vec![Peer { role, pid }])
+            info(entry.name, vec![peer(role, pid)])
         })
         .collect();
-    let role = Some(Role::Guest);
-    topics.push(info("weather/now", vec![Peer { role, pid: 4_200 }]));
+    topics.push(info("weather/now", vec![peer(Role::Guest, 4_200)]));
     model.take_ends(&topics, |_| Life::Alive);
     model.end_window(9 * S);
     for entry in TOPICS {
@@ -315,9 +324,7 @@ fn a_narrow_screen_shows_every_column_page_by_page() {
 fn the_number_of_a_writer_and_what_is_wrong_are_never_cut() {
     let mut model = driving();
     model.head.load.minute = 123.45;
-    let role = Some(Role::Supervisor);
-    let pid = 4_194_304;
-    let writers = vec![Peer { role, pid }, Peer { role, pid: 7 }];
+    let writers = vec![peer(Role::Supervisor, 4_194_304), peer(Role::Supervisor, 7)];
     model.take_ends(&[info("sensor/line", writers)], |_| Life::Alive);
     let text = picture(&model, 80, 24);
     let line = text.lines().find(|line| line.contains("sensor/line"));
@@ -428,8 +435,7 @@ fn the_chosen_row_is_always_in_sight() {
 #[test]
 fn before_anything_is_known_it_is_looking_and_nothing_is_in_trouble() {
     let mut model = Model::new("r1");
-    let role = Some(Role::Bridge);
-    let peers = vec![Peer { role, pid: 7 }];
+    let peers = vec![peer(Role::Bridge, 7)];
     model.take_ends(&[info("sensor/line", peers)], |_| Life::Alive);
     model.end_window(9 * S);
     for number in 1..4 {

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use lager_station::Warehouse;
+use lager_plant::Warehouse;
 use tungstenite::Message;
 
 use crate::scene::{Page, Running, WATCHDOG, server, status};
@@ -49,7 +49,10 @@ fn a_warehouse_is_described_and_shown_to_everybody() {
     assert_eq!(other.line("warehouse ").unwrap(), "warehouse null");
     page.say(r#"warehouse 1 {"size":[2,3],"side_length_cm":0}"#);
     let answer = page.line("answer ").unwrap();
-    assert!(answer.contains("refused side_length_cm is 0"), "{answer}");
+    assert!(
+        answer.contains("refused a square's side is 0 cm"),
+        "{answer}"
+    );
     page.say(r#"warehouse 2 {"size":[2,3],"side_length_cm":40,"product":[{"id":7,"square":[1,2],"side":"up"}]}"#);
     let answer = page.line("answer ").unwrap();
     assert_eq!(

@@ -107,7 +107,7 @@ fn on_this_machine_too_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
     assert_eq!(panel.page(&origin, "").err(), Some(403));
     let mut viewer = panel.page(&origin, cookie).unwrap();
     assert!(viewer.line("you ").unwrap().ends_with(" viewer"));
-    for (number, line) in ["do r1 1 0 resume 7", "take r1 2", "do r1 3 0 drive 2 200"]
+    for (number, line) in ["do r1 1 0 resume 7", "take r1 2", "do r1 3 0 drive 2"]
         .into_iter()
         .enumerate()
     {

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::secret::Secrets;
+use lager_orders::Reason;
 use lager_panel::{Panel, Tokens};
 use lager_station::{Handle, Listen, Server, ServerConfig};
 use tungstenite::client::IntoClientRequest as _;
@@ -122,9 +123,14 @@ impl Running {
 
     /// The socket of a page of this origin, with this cookie.
     pub(crate) fn page(&self, origin: &str, cookie: &str) -> Result<Page, u16> {
+        self.page_of("", origin, cookie)
+    }
+
+    /// The page of a person who wants to be called so.
+    pub(crate) fn page_of(&self, name: &str, origin: &str, cookie: &str) -> Result<Page, u16> {
         let stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(WATCHDOG)).unwrap();
-        let mut request = format!("ws://{}/live", self.address)
+        let mut request = format!("ws://{}/live?name={name}", self.address)
             .into_client_request()
             .unwrap();
         let headers = request.headers_mut();
@@ -204,10 +210,29 @@ impl Page {
                 continue;
             };
             if let Some(line) = text.lines().find(|line| line.starts_with(beginning)) {
-                return Some(line.to_owned());
+                return Some(shown(line));
             }
         }
     }
+}
+
+/// A line as the page shows it: the codes of an answer are sentences.
+fn shown(line: &str) -> String {
+    let words: Vec<&str> = line.splitn(4, ' ').collect();
+    let [
+        answer @ "answer",
+        number,
+        what @ ("done" | "refused" | "lost"),
+        reasons,
+    ] = words[..]
+    else {
+        return line.to_owned();
+    };
+    let reasons = reasons
+        .split("; ")
+        .map(|reason| Reason::read(reason).to_string());
+    let reasons: Vec<String> = reasons.collect();
+    format!("{answer} {number} {what} {}", reasons.join("; "))
 }
 
 /// A robot that is played.

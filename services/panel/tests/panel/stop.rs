@@ -33,14 +33,16 @@ fn a_form_of_the_panels_own_page_stops_and_says_what_became_of_it() {
     for part in [
         "text/html",
         "content-security-policy: ",
-        "r1 stands after 7 ms",
-        "r1 står efter 7 ms",
+        "r1: both wheels stand after 7 ms",
+        "r1: båda hjulen står efter 7 ms",
         "method=\"post\" action=\"/stop\"",
     ] {
         assert!(answer.contains(part), "{part}: {answer}");
     }
     // Who presses is told to everybody else.
     assert!(page.line("from r1 asked panel stop").is_some());
+    panel.stop("name=%C3%85sa&robot=r1", &origin);
+    assert!(page.line("from r1 asked Åsa stop").is_some());
 }
 
 #[test]

@@ -115,10 +115,10 @@ fn what_moves_a_robot_is_refused_when_it_was_held_up_on_the_way() {
     assert_eq!(page.line("answer 1").unwrap(), "answer 1 done");
     // The page's clock counts from when it was opened: what it says here was never quicker.
     page.say("here 10000");
-    page.say("do r1 2 10010 drive 2 200");
+    page.say("do r1 2 10010 drive 2");
     assert_eq!(page.line("answer 2").unwrap(), "answer 2 done");
     // It comes at the same moment as one that was said half a second later, so it lay somewhere.
-    page.say("do r1 3 9500 drive 4 200");
+    page.say("do r1 3 9500 drive 4");
     let answer = page.line("answer 3").unwrap();
     assert!(
         answer.starts_with("answer 3 refused came ") && answer.contains(" ms late"),
@@ -130,7 +130,7 @@ fn what_moves_a_robot_is_refused_when_it_was_held_up_on_the_way() {
         assert!(answer.contains(" ms late"), "{action}: {answer}");
     }
     // To stand it is never too late, and what moves nothing may take its time.
-    page.say("do r1 5 1 drive 1 200");
+    page.say("do r1 5 1 drive 1");
     assert_eq!(page.line("answer 5").unwrap(), "answer 5 done");
     page.say("do r1 6 9500 gains 2 2");
     assert_eq!(page.line("answer 6").unwrap(), "answer 6 done");
@@ -199,4 +199,15 @@ fn the_wheel_is_handed_over_when_its_driver_says_so() {
     drop(anna);
     let alone = |line: &str| line.contains("driver=panel-3") && !line.contains("asks=");
     while !alone(&cy.line("about r1").unwrap()) {}
+}
+
+#[test]
+fn a_person_is_called_as_he_wants_and_no_two_open_pages_alike() {
+    let panel = Running::new();
+    let own = format!("http://{}", panel.host());
+    let page = |name| panel.page_of(name, &own, &panel.cookie()).unwrap();
+    let mut anna = page("%C3%85sa");
+    assert_eq!(anna.line("you").unwrap(), "you Åsa driver");
+    assert_eq!(page("%C3%85sa").line("you").unwrap(), "you Åsa-2 driver");
+    assert_eq!(page("panel-1").line("you").unwrap(), "you panel-3 driver");
 }

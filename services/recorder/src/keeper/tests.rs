@@ -4,7 +4,8 @@ use std::fs;
 use std::time::Duration;
 
 use lager_journal::{Content, Envelope, EnvelopeSchema, Learnt, Message, Times, Visit, Walk};
-use lager_topics::{Description, LineFrame, NavMap, Stamp, Topic as _, WarehouseMap};
+use lager_sample::{Description, Stamp, Topic as _};
+use lager_topics::{LineFrame, NavMap, WarehouseMap};
 
 use super::*;
 use crate::Split;

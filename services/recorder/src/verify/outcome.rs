@@ -1,6 +1,7 @@
-//! What came of a verification, for the program that asked for it to say.
+//! The result of a verification. The program that called the verifier makes sentences of it.
 
-use lager_topics::{NavInputs, Told, Topic};
+use lager_sample::Topic;
+use lager_topics::{NavInputs, NavigatorInput};
 
 use crate::bag::BagError;
 
@@ -10,7 +11,7 @@ pub enum VerifyError {
     /// The file cannot be read.
     #[error(transparent)]
     Bag(#[from] BagError),
-    /// It has no inputs.
+    /// It has no `nav/inputs`.
     #[error(
         "it has no {}, so nothing says what the navigator was told; record it with all topics, or \
          with --topic {}",
@@ -18,23 +19,24 @@ pub enum VerifyError {
         NavInputs::NAME
     )]
     NoInputs,
-    /// Samples of then have other fields.
+    /// The recording's samples have another layout than today's.
     #[error(
-        "{topic} was recorded by another build, whose samples have other fields; verify it with that build"
+        "{topic} was recorded by another version of lager, whose samples have other fields; verify \
+         it with that version"
     )]
     Layout {
         /// The topic.
         topic: &'static str,
     },
-    /// A message is not readable.
-    #[error("{topic}: a message is not readable ({error}); `lager bag check` says more")]
+    /// A message cannot be read.
+    #[error("{topic}: a message cannot be read ({error}); `lager bag check` says more")]
     Message {
         /// The topic.
         topic: &'static str,
         /// Why.
         error: serde_json::Error,
     },
-    /// The navigator cannot be told.
+    /// This build's navigator cannot take the recorded input.
     #[error("{0}")]
     Rerun(String),
 }
@@ -42,16 +44,16 @@ pub enum VerifyError {
 /// Samples of one topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OfTopic {
-    /// What the navigators have sent while they were followed.
+    /// Samples that the followed navigators have sent.
     pub sent: u64,
-    /// Those of them that the recording has, up to the first difference: byte by byte the same.
+    /// How many of them are equal in the recording, byte by byte, up to the first difference.
     pub same: u64,
-    /// What navigators have sent, is in the recording, and follows from no input there: from the
-    /// last moments of one that was killed, from the recording's begin or end, or from a gap.
+    /// Samples in the recording that follow from no input there. They come from the last moments of
+    /// a killed navigator, from the recording's beginning or end, or from a gap.
     pub unexplained: u64,
 }
 
-/// What was compared, by topic.
+/// The compared samples, by topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compared {
     /// `steering/command`.
@@ -62,57 +64,57 @@ pub struct Compared {
     pub events: OfTopic,
 }
 
-/// What differs.
+/// A difference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// Number of the entry, counted from its navigator's begin.
+    /// The number of the entry, counted from its navigator's start.
     pub number: u64,
-    /// When its piece was published, in ns since the recording's begin.
+    /// When its piece was published, in ns since the recording's beginning.
     pub at_ns: u64,
-    /// The entry as it is in the recording.
-    pub recorded: Told,
-    /// The entry as the navigator has it now.
-    pub now: Told,
-    /// The topic of which a sample differs, if the entry is the same.
+    /// The entry in the recording.
+    pub recorded: NavigatorInput,
+    /// The navigator's entry now.
+    pub now: NavigatorInput,
+    /// The sample that differs, if the entry itself is equal.
     pub sample: Option<SampleDifference>,
 }
 
-/// A sample that is not what the navigator says now, both in JSON.
+/// A sample that differs from the navigator's sample now, both in JSON.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SampleDifference {
     /// Its topic.
     pub topic: &'static str,
     /// Its number.
     pub number: u64,
-    /// As it is in the recording.
+    /// The sample in the recording.
     pub recorded: String,
-    /// As the navigator has it now; empty if it sends none.
+    /// The navigator's sample now; empty if it sends none.
     pub now: String,
 }
 
 impl Difference {
-    /// Whether the order in force is another one.
+    /// Whether the orders in force differ.
     pub fn is_of_command(&self) -> bool {
-        let order = |told: &Told| (told.command_id, told.code, told.arm_granted);
+        let order = |entry: &NavigatorInput| (entry.command_id, entry.code, entry.arm_granted);
         order(&self.recorded) != order(&self.now)
     }
 }
 
-/// A part of the recording that nothing could be compared in.
+/// A part of the recording that the verifier could not compare.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// Where it begins, in ns since the recording's begin.
+    /// Where it begins, in ns since the recording's beginning.
     pub at_ns: u64,
     /// Why.
     pub why: Why,
-    /// Inputs in it that are in the recording.
+    /// How many recorded inputs it has.
     pub inputs: u64,
 }
 
 /// Why a part of a recording cannot be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Why {
-    /// The navigator had begun before the recording did.
+    /// The navigator had started before the recording began.
     BegunBefore,
     /// So many samples of `nav/inputs` are missing.
     Missing(u64),
@@ -120,25 +122,25 @@ pub enum Why {
     Unpublished,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, Debug, Default)]
 pub struct Verified {
-    /// Navigators that were followed from their begin.
+    /// Navigators that the verifier followed from their start.
     pub navigators: u64,
-    /// Inputs that a navigator was told again.
+    /// Inputs that a navigator got again.
     pub inputs: u64,
-    /// Samples that were compared, by topic.
+    /// Compared samples, by topic.
     pub compared: Compared,
-    /// Where nothing could be compared.
+    /// The parts that could not be compared.
     pub gaps: Vec<Gap>,
-    /// What differs first.
+    /// The first difference.
     pub first: Option<Difference>,
     /// The first command that differs.
     pub first_command: Option<Difference>,
 }
 
 impl Verified {
-    /// Whether all that the recording has of `nav/inputs` was compared and is the same.
+    /// Whether all of the recording's `nav/inputs` was compared and is equal.
     pub fn is_identical(&self) -> bool {
         self.navigators > 0 && self.gaps.is_empty() && self.first.is_none()
     }

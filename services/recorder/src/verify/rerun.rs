@@ -1,38 +1,38 @@
-//! What the verifier runs: a navigator, which this crate knows nothing of. Whoever knows both joins
-//! them.
+//! The navigator as the verifier sees it. This crate does not know the navigator; the program that
+//! knows both joins them.
 
-use lager_topics::{Event, NavigatorStatus, SteeringOrder, SteeringReport, Told};
+use lager_topics::{Beside, Event, NavigatorInput, NavigatorStatus, SteeringOrder};
 
-/// What a navigator did because of an input.
+/// What a navigator did after an input.
 #[derive(Clone, Debug, Default)]
 pub struct Did {
-    /// The entry, as this navigator writes it.
-    pub told: Told,
-    /// The order that went out.
+    /// The entry that this navigator writes.
+    pub entry: NavigatorInput,
+    /// The order that it sent.
     pub command: Option<SteeringOrder>,
-    /// The status that went out.
+    /// The status that it sent.
     pub status: Option<NavigatorStatus>,
-    /// The events that went out.
+    /// The events that it sent.
     pub events: Vec<Event>,
 }
 
-/// A navigator that is told again what one was told. Errors are sentences.
+/// A navigator that gets recorded inputs again. Errors are sentences.
 pub trait Rerun {
-    /// A navigator begins, as the text says.
+    /// A navigator starts, with the state in the text.
     ///
     /// # Errors
     /// This build cannot read the text.
     fn begin(&mut self, text: &[u8]) -> Result<(), String>;
 
-    /// Takes the map that the next entries mean.
+    /// Takes the map to which the next entries refer.
     ///
     /// # Errors
     /// This build cannot read the text.
     fn take_map(&mut self, text: &[u8]) -> Result<(), String>;
 
-    /// Takes an entry with the report that it means.
+    /// Takes an entry, with the sample to which it refers.
     ///
     /// # Errors
     /// The entry makes no sense.
-    fn handle(&mut self, told: &Told, report: Option<&SteeringReport>) -> Result<Did, String>;
+    fn handle(&mut self, entry: &NavigatorInput, beside: Beside<'_>) -> Result<Did, String>;
 }

@@ -1,12 +1,13 @@
-//! The samples of a recording that a navigator has sent, kept until the entry comes from which they
-//! follow. They are published before it, so few wait at a time.
+//! Keeps the samples that a navigator has sent until their entry of `nav/inputs` comes. Logic
+//! publishes them before the entry, so few wait at a time.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use lager_journal::{Envelope, EnvelopeSchema};
+use lager_sample::{Description, Field, Payload, Topic, bytes_of};
 use lager_topics::{
-    Description, Event, Field, MissionEvent, NavStatus, NavigatorStatus, Origin, Payload, Sent,
-    SteeringCommand, SteeringOrder, ToldInputs, Topic, bytes_of,
+    Event, MissionEvent, NavStatus, NavigatorInputs, NavigatorStatus, Origin, Sent,
+    SteeringCommand, SteeringOrder,
 };
 
 use super::outcome::{Compared, OfTopic, SampleDifference, VerifyError};
@@ -15,10 +16,10 @@ use super::rerun::Did;
 /// The topic of the orders.
 pub(super) const COMMANDS: &str = SteeringCommand::NAME;
 
-/// What is compared besides `nav/inputs`.
+/// The topics that are compared besides `nav/inputs`.
 pub(super) const TOPICS: [&str; 3] = [COMMANDS, NavStatus::NAME, MissionEvent::NAME];
 
-/// Refuses a topic of [`TOPICS`] whose samples this build lays out otherwise.
+/// Refuses a topic of [`TOPICS`] that has another layout in this build.
 pub(super) fn must_fit_as_compared(topic: &str, schema: &[u8]) -> Result<(), VerifyError> {
     match topic {
         COMMANDS => must_fit::<SteeringOrder>(COMMANDS, schema),
@@ -28,7 +29,7 @@ pub(super) fn must_fit_as_compared(topic: &str, schema: &[u8]) -> Result<(), Ver
     }
 }
 
-/// Refuses samples that this build lays out otherwise.
+/// Refuses samples that have another layout in this build.
 pub(super) fn must_fit<P: Payload>(topic: &'static str, schema: &[u8]) -> Result<(), VerifyError> {
     match EnvelopeSchema::of(&Description::of::<P>()).fits(schema) {
         true => Ok(()),
@@ -44,7 +45,7 @@ pub(super) fn read<P: Payload>(
     serde_json::from_slice(message).map_err(|error| VerifyError::Message { topic, error })
 }
 
-/// Whether two payloads are the same, byte by byte.
+/// Whether two payloads are equal, byte by byte.
 fn same<P: Field>(one: &P, other: &P) -> bool {
     bytes_of(one) == bytes_of(other)
 }
@@ -56,7 +57,7 @@ struct Waiting<P> {
     waiting: BTreeMap<(u64, u64), P>,
     /// Epochs of navigators.
     known: BTreeSet<u64>,
-    /// What the navigator sends next.
+    /// The number of the navigator's next sample.
     at: Sent,
     count: OfTopic,
 }
@@ -84,8 +85,8 @@ impl<P: Payload> Waiting<P> {
         self.at = at;
     }
 
-    /// Compares the next sample with what the navigator sends now; `as_sent` puts in what only its
-    /// shell knows.
+    /// Compares the next sample with the one that the navigator sends now. `as_sent` fills in what
+    /// only the shell knows.
     fn compare(&mut self, mut now: P, as_sent: impl Fn(&mut P, &P)) -> Option<SampleDifference> {
         let number = self.at.next;
         self.at.next += 1;
@@ -143,16 +144,16 @@ impl Samples {
         }
     }
 
-    /// A navigator begins.
-    pub(super) fn begin(&mut self, piece: &ToldInputs) {
+    /// A navigator starts.
+    pub(super) fn begin(&mut self, piece: &NavigatorInputs) {
         self.commands.begin(piece.commands);
         self.statuses.begin(piece.statuses);
         self.events.begin(piece.events);
     }
 
-    /// A piece with entries begins. What is wrong if the navigator's shell had sent more or less by
-    /// then than the navigator has now.
-    pub(super) fn begin_piece(&self, piece: &ToldInputs) -> Option<SampleDifference> {
+    /// A piece with entries begins. Returns what is wrong if the navigator had sent more or fewer
+    /// samples by then than the navigator has now.
+    pub(super) fn begin_piece(&self, piece: &NavigatorInputs) -> Option<SampleDifference> {
         let told = [
             (COMMANDS, self.commands.at, piece.commands),
             (NavStatus::NAME, self.statuses.at, piece.statuses),
@@ -167,7 +168,7 @@ impl Samples {
         })
     }
 
-    /// Compares what the navigator sends because of one entry.
+    /// Compares the samples that the navigator sends after one entry.
     pub(super) fn compare(&mut self, did: &Did) -> Option<SampleDifference> {
         let mut first = None;
         if let Some(command) = did.command {
@@ -184,7 +185,7 @@ impl Samples {
         first
     }
 
-    /// What was compared.
+    /// The compared samples.
     pub(super) fn finish(self) -> Compared {
         Compared {
             commands: self.commands.finish(|order| order.origin == Origin::Logic),

@@ -1,21 +1,22 @@
-//! Picking goods up and dropping them, by commands.
+//! Tests that the robot picks goods up and drops them, by commands.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
 use lager_plant::GoodState;
-use lager_simulator::{Robot, Snapshot};
+use lager_plant::Snapshot;
+use lager_simulator::Robot;
 use lager_wire::{ArmCommand, Command, SteerFlags, WheelCommand};
 
 use crate::pi::{Pi, ms};
 
-/// Steps from the pose the arm is carried in down to goods on a shelf 250 mm ahead of the axle.
+/// Steps of the arm from its carrying pose down to goods on a shelf 250 mm ahead of the axle.
 const OUT: usize = 30;
 const DOWN: usize = 97;
 
-/// A robot that has picked product 1 up and carries it.
+/// A robot that has picked up product 1 and carries it.
 fn loaded() -> Pi {
     let mut pi = Pi::in_builtin("small");
-    // Turned in at the station: the axle on the edge's line, 7 mm off, the claw over the mark.
+    // It has turned at the station: axle 7 mm off the edge's line, claw over the mark.
     pi.place(755.0, 5.0, FRAC_PI_2);
     pi.wheels(WheelCommand::Standby);
     pi.run(ms(200));
@@ -50,7 +51,7 @@ fn goods_are_picked_up_and_dropped_at_the_bar() {
         "lifted"
     );
 
-    // In front of the bar, as after following the exit.
+    // In front of the delivery bar, as after following the exit.
     pi.place(-640.0, 0.0, PI);
     let flags = pi.carry_out(Command::Arm(ArmCommand::Drop), ms(15_000));
     assert!(!flags.contains(SteerFlags::ABORTED));
@@ -65,28 +66,6 @@ fn goods_let_go_elsewhere_lie_there() {
     let truth = pi.robot.truth();
     assert_eq!(state(&truth), GoodState::Lying);
     assert_eq!(truth.world.goods[0].position[2], 25.0);
-}
-
-#[test]
-fn an_empty_squeeze_ends_closed() {
-    let mut pi = Pi::in_builtin("small");
-    // Until the first standby the arm is locked.
-    pi.wheels(WheelCommand::Standby);
-    pi.run(ms(300));
-    pi.arm(ArmCommand::Squeeze, 1);
-    assert_eq!(pi.robot.truth().carrying, None);
-    assert!(pi.heard.servos[7].unwrap().position < 230);
-}
-
-#[test]
-fn the_arm_is_locked_while_the_robot_drives() {
-    let mut pi = Pi::in_builtin("small");
-    let before = pi.robot.truth().world.servo_positions;
-    pi.wheels(WheelCommand::ManualForward);
-    pi.run(ms(300));
-    let flags = pi.carry_out(Command::Arm(ArmCommand::Left), ms(1_000));
-    assert!(flags.contains(SteerFlags::REFUSED));
-    assert_eq!(pi.robot.truth().world.servo_positions, before);
 }
 
 #[test]

@@ -1,8 +1,9 @@
-//! Handshake, line following, turns, and what the sensors say on the way.
+//! Tests of the handshake, of line following and turns, and of the sensors' reports meanwhile.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use lager_plant::{Obstacle, Product, Side, Warehouse};
+use lager_floor::{Heading, Node};
+use lager_plant::{NamedProduct, Obstacle, Warehouse};
 use lager_simulator::Wire;
 use lager_wire::{Callsign, Command, LineState, SteerFlags, WheelCommand};
 
@@ -11,7 +12,7 @@ use crate::pi::{Pi, ms};
 /// A long straight line: nodes at x = 0 and x = 4000.
 fn long() -> Warehouse {
     Warehouse {
-        size: [1, 1],
+        size: Node::new(1, 1),
         side_length_cm: 400,
         products: Vec::new(),
         ..Warehouse::builtin("small").unwrap()
@@ -37,7 +38,7 @@ fn both_boards_say_who_they_are_and_then_report() {
     );
     pi.run(ms(1_000));
     assert_eq!(pi.lost(), 0);
-    // 200 sensor packets and 200 reports a second, servos and statuses beside them.
+    // 200 sensor packets and 200 reports a second, and besides them servos and statuses.
     assert!(
         (380..450).contains(&pi.heard.packets),
         "{}",
@@ -124,8 +125,8 @@ fn a_turn_at_a_crossing_ends_on_tape_a_quarter_further() {
     }
 }
 
-/// The states a robot meets on its way along the line: those that last 50 ms, since a crossing
-/// passed a little aslant shows one half for a moment, and without the follower's deviations.
+/// The line states that a robot meets on its way, without the follower's deviations. Each lasts at
+/// least 50 ms, because a crossing passed at an angle shows one half for a moment.
 fn met(pi: &mut Pi, x: f64, y: f64, heading: f64, time: u64) -> Vec<LineState> {
     pi.place(x, y, heading);
     pi.run(ms(50));
@@ -157,12 +158,12 @@ fn met(pi: &mut Pi, x: f64, y: f64, heading: f64, time: u64) -> Vec<LineState> {
 fn a_mark_is_told_on_its_side_and_a_crossing_on_both() {
     use LineState::{FourWay, OnLine, StationToLeft, StationToRight};
     let mut warehouse = Warehouse::builtin("small").unwrap();
-    warehouse.size = [3, 3];
-    warehouse.products = vec![Product {
+    warehouse.size = Node::new(3, 3);
+    warehouse.products = vec![NamedProduct {
         id: 1,
         name: None,
-        square: [1, 1],
-        side: Side::Down,
+        square: Node::new(1, 1),
+        side: Heading::Down,
     }];
     let mut pi = Pi::started(&warehouse, 1);
     // Along y = 500 from x = 550: the station of square (1, 1) at 750, the crossing at 1000.
@@ -206,15 +207,15 @@ fn where_the_line_ends_the_kind_of_end_is_told() {
     let mut warehouse = Warehouse::builtin("small").unwrap();
     warehouse.products.clear();
     let mut pi = Pi::started(&warehouse, 3);
-    // A corner: only the way to the left goes on.
+    // A corner: only the way to the left continues.
     let corner = met(&mut pi, 700.0, 0.0, 0.0, 3_500);
     assert_eq!(corner, [OnLine, StationToLeft, NotOnLine]);
     let corner = met(&mut pi, 700.0, 1_000.0, 0.0, 3_500);
     assert_eq!(corner, [OnLine, StationToRight, NotOnLine]);
-    // The border seen from inside: both ways, and nothing straight on.
+    // The border seen from inside: ways to both sides, and none straight ahead.
     let border = met(&mut pi, 700.0, 500.0, 0.0, 3_500);
     assert_eq!(border, [OnLine, FourWay, DropStation]);
-    // The delivery bar, 800 mm out.
+    // The delivery bar, 800 mm outside.
     let bar = met(&mut pi, -300.0, 0.0, PI, 6_000);
     assert_eq!(bar, [OnLine, FourWay, DropStation]);
 }
@@ -274,10 +275,10 @@ fn every_exit_can_be_followed_to_its_bar() {
 fn an_obstacle_is_told_at_its_distance() {
     let mut warehouse = long();
     warehouse.obstacles.push(Obstacle {
-        between: [[0, 0], [1, 0]],
+        between: [Node::new(0, 0), Node::new(1, 0)],
     });
     let mut pi = Pi::started(&warehouse, 1);
-    // Its face is at x = 1960 and the ranger 100 mm ahead of the axle.
+    // The obstacle's face is at x = 1960 mm, and the ranger 100 mm ahead of the axle.
     for (centimetres, tolerance) in [(12, 1), (20, 1), (35, 2), (60, 4), (75, 8)] {
         pi.place(1_860.0 - 10.0 * f64::from(centimetres), 0.0, 0.0);
         pi.run(ms(150));

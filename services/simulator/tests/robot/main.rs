@@ -1,4 +1,4 @@
-//! A robot driven by raw packets, as the bridge drives it, in virtual time.
+//! Tests of a simulated robot that gets raw packets, as from the bridge, in virtual time.
 
 mod arm;
 mod driving;

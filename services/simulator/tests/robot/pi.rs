@@ -1,5 +1,5 @@
-//! A Pi that speaks to both boards in packets: handshakes, renews its command, and notes
-//! everything it is told.
+//! A Pi for tests that speaks to both boards in packets: it answers handshakes, renews its command,
+//! and keeps what the boards report.
 
 use core::time::Duration;
 
@@ -11,7 +11,7 @@ use lager_wire::{
     SteerFlags, WheelCommand,
 };
 
-/// How often the command in force is repeated.
+/// The time between two repetitions of the command in force.
 const RENEW: Duration = Duration::from_millis(40);
 
 pub(crate) fn ms(milliseconds: u64) -> Duration {
@@ -24,11 +24,11 @@ struct Line {
     transmitter: HostTransmitter,
 }
 
-/// What has been heard, the latest of each and what is worth a history.
+/// The boards' reports: the latest of each kind, and a history where tests need one.
 #[derive(Default)]
 pub(crate) struct Heard {
     pub(crate) ups: Vec<(Wire, Up)>,
-    /// Line states without repetitions, with the time of the first packet of each.
+    /// Line states without repetitions, each with the time of its first packet.
     pub(crate) states: Vec<(Duration, LineState)>,
     pub(crate) distance: Option<u8>,
     pub(crate) steer: Option<SteerData>,
@@ -68,7 +68,7 @@ impl Pi {
         }
     }
 
-    /// A robot as drawn, of seed 1, in a built-in warehouse, both links up.
+    /// A robot as drawn ([`Make::Nominal`]), in a built-in warehouse, with both links up.
     pub(crate) fn in_builtin(name: &str) -> Self {
         Self::started(&Warehouse::builtin(name).unwrap(), 1)
     }
@@ -100,7 +100,7 @@ impl Pi {
         self.robot.place(Pose { x, y, heading });
     }
 
-    /// Puts a new command in force and renews it from now on.
+    /// Gives a new command, and renews it from now on.
     pub(crate) fn command(&mut self, command: Command) -> u8 {
         self.seq = self.seq.wrapping_add(1);
         self.command = Some(SteerCommand {
@@ -115,12 +115,7 @@ impl Pi {
         self.command(Command::Wheel(command))
     }
 
-    /// Says nothing to the steering board any more.
-    pub(crate) fn fall_silent(&mut self) {
-        self.command = None;
-    }
-
-    /// Gives a command that runs once and waits for its end; the flags it ended with.
+    /// Gives a one-shot command and waits for its end; returns the flags with which it ended.
     pub(crate) fn carry_out(&mut self, command: Command, limit: Duration) -> SteerFlags {
         let seq = self.command(command);
         self.until(limit, |pi| {
@@ -145,7 +140,7 @@ impl Pi {
         self.watch(time, |_| {});
     }
 
-    /// Runs and calls `see` after every packet that came.
+    /// Runs for `time`, and calls `see` after every received packet.
     pub(crate) fn watch(&mut self, time: Duration, mut see: impl FnMut(&mut Pi)) {
         let end = self.robot.now() + time;
         while self.robot.now() < end {
@@ -154,7 +149,7 @@ impl Pi {
         }
     }
 
-    /// Runs until `done`; a watchdog in robot time catches what never comes.
+    /// Runs until `done`; fails after `limit` of robot time.
     pub(crate) fn until(&mut self, limit: Duration, mut done: impl FnMut(&Pi) -> bool) {
         let end = self.robot.now() + limit;
         while !done(self) {

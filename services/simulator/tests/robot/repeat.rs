@@ -1,6 +1,4 @@
-//! The same seed is the same robot, however time is cut, and much faster than real.
-
-use std::time::Instant;
+//! Tests that a seed always makes the same robot, however the caller divides the time.
 
 use lager_plant::Warehouse;
 use lager_simulator::{Robot, RobotOptions, Wire};
@@ -8,7 +6,7 @@ use lager_wire::{ArmCommand, Command, WheelCommand};
 
 use crate::pi::{Pi, ms};
 
-/// A short life with driving, turning and an arm step, as all bytes both boards sent.
+/// A short run with driving, turning and a step of the arm; returns all bytes of both boards.
 fn life(seed: u64) -> Vec<u8> {
     let mut pi = Pi::started(&Warehouse::builtin("curved").unwrap(), seed);
     pi.wheels(WheelCommand::ActiveForward);
@@ -48,17 +46,4 @@ fn time_may_be_cut_in_any_way() {
     for step_us in [7, 333, 5_000] {
         assert_eq!(run(step_us), whole, "{step_us} us");
     }
-}
-
-/// Prints the pace; it is a figure for people, since a test must not hang on a machine's speed.
-#[test]
-fn the_pace_is_told() {
-    let mut pi = Pi::in_builtin("large");
-    pi.wheels(WheelCommand::ActiveForward);
-    let start = Instant::now();
-    let time = ms(20_000);
-    pi.run(time);
-    let pace = time.as_secs_f64() / start.elapsed().as_secs_f64();
-    println!("{pace:.0} times real time, Pi included");
-    assert!(pi.pose().x > 1_000.0);
 }

@@ -1,14 +1,15 @@
-//! Robots as parts come out of the box: what the boards learn of them, and what they run into.
+//! Tests of robots with imperfections: what the boards learn about them, and where it matters.
 
 use core::f64::consts::{FRAC_PI_2, PI};
+use lager_floor::Node;
 
-use lager_plant::{Floor, Obstacle, Product, Warehouse};
+use lager_plant::{Floor, NamedProduct, Obstacle, Warehouse};
 use lager_simulator::{CalibrateError, Robot, RobotOptions, calibrate};
 use lager_wire::{Command, LineState, WheelCommand};
 
 use crate::pi::{Pi, ms};
 
-/// A robot of this seed, both links up.
+/// A robot of this seed with both links up.
 fn varied(warehouse: &Warehouse, seed: u64) -> Pi {
     let options = RobotOptions {
         seed,
@@ -19,11 +20,11 @@ fn varied(warehouse: &Warehouse, seed: u64) -> Pi {
     pi
 }
 
-fn without_goods(size: [u8; 2], side_length_cm: u16) -> Warehouse {
+fn without_goods(size: Node, side_length_cm: u16) -> Warehouse {
     Warehouse {
         size,
         side_length_cm,
-        products: Vec::<Product>::new(),
+        products: Vec::<NamedProduct>::new(),
         ..Warehouse::builtin("small").unwrap()
     }
 }
@@ -31,7 +32,7 @@ fn without_goods(size: [u8; 2], side_length_cm: u16) -> Warehouse {
 #[test]
 fn whatever_the_motors_are_a_line_is_followed_without_weaving() {
     for seed in 1..=20 {
-        let mut pi = varied(&without_goods([1, 1], 400), seed);
+        let mut pi = varied(&without_goods(Node::new(1, 1), 400), seed);
         pi.place(300.0, 10.0, 0.0);
         pi.wheels(WheelCommand::ActiveForward);
         pi.run(ms(36_000));
@@ -51,9 +52,9 @@ fn whatever_the_motors_are_a_line_is_followed_without_weaving() {
 #[test]
 fn a_turn_stays_on_its_place_once_the_sides_are_known() {
     for seed in 1..=20 {
-        let mut pi = varied(&without_goods([4, 1], 50), seed);
+        let mut pi = varied(&without_goods(Node::new(4, 1), 50), seed);
         pi.wheels(WheelCommand::ActiveForward);
-        // Two nodes teach how unlike the sides are.
+        // After two nodes the board has learnt how unequal the two sides are.
         pi.until(ms(40_000), |pi| pi.pose().x > 1_500.0);
         pi.wheels(WheelCommand::Standby);
         pi.run(ms(500));
@@ -72,7 +73,7 @@ fn a_turn_stays_on_its_place_once_the_sides_are_known() {
 fn a_full_and_an_empty_battery_drive_at_nearly_the_same_speed() {
     for seed in 1..=10 {
         let way = |charge: f64| {
-            let mut pi = varied(&without_goods([1, 1], 400), seed);
+            let mut pi = varied(&without_goods(Node::new(1, 1), 400), seed);
             pi.robot.world_mut().set_battery_charge(charge);
             pi.place(300.0, 0.0, 0.0);
             pi.wheels(WheelCommand::ActiveForward);
@@ -91,9 +92,9 @@ fn a_full_and_an_empty_battery_drive_at_nearly_the_same_speed() {
 
 #[test]
 fn a_body_that_is_driven_into_an_obstacle_stops_and_is_counted() {
-    let mut warehouse = without_goods([2, 1], 60);
+    let mut warehouse = without_goods(Node::new(2, 1), 60);
     warehouse.obstacles.push(Obstacle {
-        between: [[1, 0], [2, 0]],
+        between: [Node::new(1, 0), Node::new(2, 0)],
     });
     let mut pi = varied(&warehouse, 3);
     pi.place(500.0, 0.0, 0.0);
@@ -101,7 +102,7 @@ fn a_body_that_is_driven_into_an_obstacle_stops_and_is_counted() {
     pi.run(ms(15_000));
     assert_eq!(pi.robot.world().collisions(), 1);
     assert_eq!(pi.robot.truth().world.collisions, 1);
-    // The obstacle's face is at 860 mm, the body reaches 170 mm ahead of the axle.
+    // The obstacle's face is at 860 mm, and the body reaches 170 mm ahead of the axle.
     assert!((pi.pose().x - 690.0).abs() < 3.0, "{:?}", pi.pose());
     let pose = pi.pose();
     pi.place(pose.x - 100.0, 0.0, PI);
@@ -144,9 +145,9 @@ fn a_weak_contrast_is_seen_once_the_sensors_are_calibrated() {
 
 #[test]
 fn rangers_of_all_seeds_see_an_obstacle_in_time() {
-    let mut warehouse = without_goods([2, 1], 50);
+    let mut warehouse = without_goods(Node::new(2, 1), 50);
     warehouse.obstacles.push(Obstacle {
-        between: [[1, 0], [1, 1]],
+        between: [Node::new(1, 0), Node::new(1, 1)],
     });
     for seed in 1..=20 {
         let mut pi = varied(&warehouse, seed);

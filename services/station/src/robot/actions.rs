@@ -1,26 +1,29 @@
-//! What only a robot does that speaks the extension: numbered actions, and a driver.
+//! Numbered actions, and the driver. Only robots that speak the extension have them.
 
 use std::time::Duration;
 
-use lager_lines::TooLate;
-use lager_lines::command::Wheels;
 use lager_lines::conversation::StationLine;
-use lager_lines::extension::{Action, Order};
+use lager_lines::extension::Order;
+use lager_orders::lease::{COMMAND, TooLate};
+use lager_orders::{Action, LeaseMs, Wheels};
 use lager_wire::{OperatorArm, OperatorCommand};
 
 use super::{ActRefused, Robot};
 use crate::given::Given;
-use crate::shown::{Reply, Told};
-use crate::wheel::{Key, LEASE};
+use crate::shown::{Reply, Saying};
+use crate::wheel::Key;
+
+/// [`COMMAND`] as a line says it.
+const COMMAND_LEASE: LeaseMs = LeaseMs::new(COMMAND.as_millis() as u16).expect("a time in ms");
 
 impl Robot {
-    /// Gives it an action, whose number is returned. To drive it and to move its arm is its
-    /// driver's.
+    /// Gives the robot an action and returns its number. Only the driver may drive the robot or
+    /// move its arm.
     ///
     /// # Errors
     ///
-    /// When it does not speak the extension, too many are unanswered, only its driver may, or it
-    /// comes too late.
+    /// The robot does not speak the extension, too many actions wait for answers, only the driver
+    /// may give this one, or it comes too late.
     pub fn act(
         &mut self,
         action: impl Into<Given<Action>>,
@@ -32,21 +35,21 @@ impl Robot {
         }
     }
 
-    /// Lets `who` drive it, and nobody else until he leaves or is silent for 3 s.
+    /// Lets only `who` drive the robot, until this person leaves or says nothing for 3 s.
     ///
     /// # Errors
     ///
-    /// When somebody else drives it.
+    /// Somebody else drives it.
     pub fn take_wheel(&mut self, who: &str) -> Result<Key, ActRefused> {
         let taken = self.wheel.take(who, self.now);
         taken.map_err(|by| ActRefused::Driven { by })
     }
 
-    /// Its driver turns the wheels: for 150 ms, unless he does so again.
+    /// The driver turns the wheels for 150 ms; to drive on, the driver repeats the command.
     ///
     /// # Errors
     ///
-    /// When he drives it no more, or as with [`Robot::act`].
+    /// This person drives it no more, or as with [`Robot::act`].
     pub fn drive(
         &mut self,
         key: Key,
@@ -57,12 +60,12 @@ impl Robot {
         self.word(key, Some(drives))?;
         let action = Action::Drive {
             wheels,
-            lease: LEASE,
+            lease: COMMAND_LEASE,
         };
         self.order(action, late)
     }
 
-    /// Its driver moves the arm by a step.
+    /// The driver moves the arm by a step.
     ///
     /// # Errors
     ///
@@ -77,21 +80,22 @@ impl Robot {
         self.order(Action::Arm(step), late)
     }
 
-    /// Its driver is still there.
+    /// The driver says that he is still there.
     ///
     /// # Errors
     ///
-    /// When he drives it no more.
+    /// This person drives it no more.
     pub fn stay(&mut self, key: Key) -> Result<(), ActRefused> {
         self.word(key, None)
     }
 
-    /// Its driver leaves; it stands if it still turns its wheels by his word.
+    /// The driver leaves. The robot stands if the driver's last command still turns its wheels.
     pub fn leave_wheel(&mut self, key: Key) -> Option<StationLine> {
         self.wheel.leave(key).then(|| self.stand())?
     }
 
-    /// Time has passed: a driver who is silent loses the seat, and what was not answered is lost.
+    /// Time has passed. A silent driver loses the wheel, and the robot has lost the actions that it
+    /// did not answer in time.
     pub fn turn(&mut self, now: Duration) -> Option<StationLine> {
         self.now = now;
         let lost = self.asked.lost(now, false);
@@ -99,8 +103,8 @@ impl Robot {
         self.wheel.lapse(now).then(|| self.stand())?
     }
 
-    /// What it has said since this was asked last.
-    pub fn news(&mut self) -> Vec<Told> {
+    /// Takes what the robot has said since the last call.
+    pub fn news(&mut self) -> Vec<Saying> {
         core::mem::take(&mut self.told_news)
     }
 
@@ -128,12 +132,12 @@ impl Robot {
         Ok((number, StationLine::Order(order)))
     }
 
-    /// Makes it stand whose driver is gone. Nobody waits for the answer.
+    /// Makes the robot stand because its driver has gone. Nobody waits for the answer.
     fn stand(&mut self) -> Option<StationLine> {
         self.hello.as_ref()?;
         let action = Action::Drive {
             wheels: Wheels::new(OperatorCommand::Stop)?,
-            lease: LEASE,
+            lease: COMMAND_LEASE,
         };
         let number = self.asked.number();
         let late_ms = 0;
@@ -145,7 +149,7 @@ impl Robot {
     }
 
     pub(super) fn lose(&mut self, numbers: impl IntoIterator<Item = u32>) {
-        let lost = numbers.into_iter().map(|number| Told::Replied {
+        let lost = numbers.into_iter().map(|number| Saying::Replied {
             number,
             reply: Reply::Lost,
         });

@@ -1,34 +1,35 @@
-//! What is known of a robot.
+//! What the station knows of a robot.
 
+use lager_floor::{Heading, Node, ProductId};
 use lager_lines::gag::Query;
-use lager_lines::{Coord, Direction, Name, ProductId, Text};
+use lager_lines::{Name, Text};
 use lager_wire::OperatorCommand;
 
 use super::{Doing, Robot};
 use crate::shown::Shown;
 
-/// In what two warehouses differ.
+/// How two warehouses differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Other {
     /// In their size, their delivery or their squares.
     Floor,
-    /// In nothing but the goods.
+    /// Only in the goods.
     Goods,
 }
 
 impl Robot {
-    /// What it is doing.
+    /// What the robot is doing.
     pub const fn doing(&self) -> Doing {
         self.doing
     }
 
-    /// Its name, once it has announced the extension.
+    /// Its name, if it speaks the extension.
     pub fn name(&self) -> Option<&Name> {
         self.hello.as_ref().map(|hello| &hello.name)
     }
 
-    /// In what the warehouse that it was told differs from the one that there is, if it was told
-    /// all of it.
+    /// How the warehouse that the robot was told differs from today's. `None` if they are equal, or
+    /// if the robot was not told all of it.
     pub(crate) fn uses_other(&self) -> Option<Other> {
         let (side, map, products) = self.warehouse.as_ref()?;
         let known = &self.known;
@@ -42,12 +43,12 @@ impl Robot {
         (known.products.as_ref() != Some(products)).then_some(Other::Goods)
     }
 
-    /// The question that is held.
+    /// The question that is open.
     pub const fn held(&self) -> Option<Query> {
         self.held.get()
     }
 
-    /// The product that it was told last.
+    /// The last product that the station told it.
     pub const fn told(&self) -> Option<ProductId> {
         self.told
     }
@@ -57,7 +58,7 @@ impl Robot {
         self.queue.iter().copied()
     }
 
-    /// The same, with the product before them that it was told and may not have heard.
+    /// The same, after the product that the station has told it and that it may not have got.
     pub fn unfetched(&self) -> impl Iterator<Item = ProductId> {
         let told = self.told.filter(|_| self.is_unanswered);
         told.into_iter().chain(self.queue())
@@ -68,27 +69,27 @@ impl Robot {
         self.commands.iter().copied()
     }
 
-    /// The node it told last, to which it goes.
-    pub const fn node(&self) -> Option<Coord> {
+    /// The node to which it goes, as it said last.
+    pub const fn node(&self) -> Option<Node> {
         self.node
     }
 
-    /// Where it said last that it looks.
-    pub const fn looks(&self) -> Option<Direction> {
+    /// Which way it looks, as it said last.
+    pub const fn looks(&self) -> Option<Heading> {
         self.looks
     }
 
-    /// What it said last.
+    /// Its last thought.
     pub const fn thought(&self) -> Option<&Text> {
         self.thought.as_ref()
     }
 
-    /// What it has shown of itself by the extension.
+    /// The state that it has shown by the extension.
     pub const fn shown(&self) -> &Shown {
         &self.shown
     }
 
-    /// Who drives it by actions.
+    /// The person who drives it by actions.
     pub fn driver(&self) -> Option<&str> {
         self.wheel.driver()
     }

@@ -1,36 +1,36 @@
-//! What a person wants of a robot that speaks the extension, and what such robots say.
+//! The actions that people give to robots that speak the extension, and the news of such robots.
 
 use std::time::Duration;
 
-use lager_lines::command::Wheels;
-use lager_lines::extension::Action;
-use lager_lines::{LATEST_MOVE, Name};
+use lager_lines::Name;
+use lager_orders::lease::LATEST_MOVE;
+use lager_orders::{Action, Wheels};
 use lager_wire::OperatorArm;
 
 use super::{Station, WishRefused};
 use crate::given::Given;
 use crate::robot::{ActRefused, Robot};
-use crate::shown::Told;
+use crate::shown::Saying;
 use crate::wheel::Key;
 
 /// What a robot has just said.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct News {
-    /// Which.
+pub struct RobotSaid {
+    /// The robot.
     pub robot: Name,
     /// When, by the station's clock.
     pub at: Duration,
-    /// What.
-    pub told: Told,
+    /// Its news.
+    pub told: Saying,
 }
 
-/// What people want. Numbers are those of the answers, see [`Told::Replied`].
+/// What people want. An answer has the number of its action, see [`Saying::Replied`].
 impl Station {
     /// Gives a robot an action.
     ///
     /// # Errors
     ///
-    /// When it takes none, or it is its driver's to do that; see [`Robot::act`].
+    /// The robot takes no actions, or only its driver may give this one; see [`Robot::act`].
     pub fn act(
         &mut self,
         name: &Name,
@@ -41,23 +41,23 @@ impl Station {
         Ok(number)
     }
 
-    /// Stops a robot, whoever drives it. One that speaks only the document's language confirms
+    /// Stops a robot, whoever drives it. A robot that speaks only the document's language confirms
     /// nothing, so its stop has no number.
     ///
     /// # Errors
     ///
-    /// When it speaks only that and does not ask for commands.
+    /// The robot speaks only the document's language and does not ask for commands.
     pub fn stop(&mut self, name: &Name) -> Result<Option<u32>, WishRefused> {
         let (number, line) = self.known(name)?.stop()?;
         self.say(name, line);
         Ok(number)
     }
 
-    /// Lets `who` drive a robot, and nobody else: what a GaG has told it ends.
+    /// Lets only `who` drive a robot. A command that a GaG gave it ends.
     ///
     /// # Errors
     ///
-    /// When somebody else drives it.
+    /// Somebody else drives it.
     pub fn take_wheel(&mut self, name: &Name, who: &str) -> Result<Key, WishRefused> {
         let robot = self.known(name)?;
         let key = robot.take_wheel(who)?;
@@ -71,11 +71,11 @@ impl Station {
         Ok(key)
     }
 
-    /// Its driver turns the wheels, for 150 ms unless he does so again.
+    /// The driver turns the wheels for 150 ms; to drive on, the driver repeats the command.
     ///
     /// # Errors
     ///
-    /// When he drives it no more, or the robot takes no action.
+    /// This person drives it no more, or the robot takes no action.
     pub fn drive(
         &mut self,
         name: &Name,
@@ -87,7 +87,7 @@ impl Station {
         Ok(number)
     }
 
-    /// Its driver moves the arm by a step.
+    /// The driver moves the arm by a step.
     ///
     /// # Errors
     ///
@@ -103,16 +103,16 @@ impl Station {
         Ok(number)
     }
 
-    /// Its driver is still there, though he drives nowhere.
+    /// The driver says that he is still there, and moves nothing.
     ///
     /// # Errors
     ///
-    /// When he drives it no more.
+    /// This person drives it no more.
     pub fn stay(&mut self, name: &Name, key: Key) -> Result<(), WishRefused> {
         Ok(self.known(name)?.stay(key)?)
     }
 
-    /// Its driver leaves.
+    /// The driver leaves.
     pub fn leave_wheel(&mut self, name: &Name, key: Key) {
         if let Some(robot) = self.robots.get_mut(name) {
             let line = robot.leave_wheel(key);
@@ -126,11 +126,11 @@ impl Station {
     }
 }
 
-/// Time, and what robots say.
+/// Time, and the news of robots.
 impl Station {
-    /// Time has passed. To be called before anything else that happens at this moment, and at least
-    /// every 100 ms; it counts from any origin. Commands that have waited while the station was held
-    /// up are dropped.
+    /// Time has passed. Call this before everything else that happens at the same moment, and at
+    /// least every 100 ms. Time counts from any origin. If the station was held up, the commands
+    /// that waited are dropped.
     pub fn turn(&mut self, now: Duration) {
         let pause = now.saturating_sub(self.now);
         self.now = now;
@@ -155,12 +155,12 @@ impl Station {
         self.now
     }
 
-    /// What robots have said since this was asked last.
-    pub fn news(&mut self) -> Vec<News> {
+    /// What robots have said since the last call.
+    pub fn news(&mut self) -> Vec<RobotSaid> {
         let mut news = Vec::new();
         let at = self.now;
         for (name, robot) in &mut self.robots {
-            news.extend(robot.news().into_iter().map(|told| News {
+            news.extend(robot.news().into_iter().map(|told| RobotSaid {
                 robot: name.clone(),
                 at,
                 told,

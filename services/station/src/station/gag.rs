@@ -1,27 +1,31 @@
 //! The GaG that speaks for one of the robots.
 //!
-//! A GaG may send commands faster than its robot takes them, and then it has not been asked for
-//! them. Those wait in the robot's queue of commands ([`Robot::command`]), in their order, and so
-//! does the `pickup_done` behind them (C5). The robot takes them before the GaG is asked for
-//! another one.
+//! A GaG may send commands faster than its robot takes them, before the station has asked for them.
+//! They wait in the robot's queue of commands ([`Robot::command`]) in their order, and so does a
+//! `pickup_done` behind them (C5). The robot takes them first; then the station asks the GaG for
+//! the next one.
 
 use std::time::Duration;
 
+use lager_floor::{Grid, Product, SideLength};
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::{LATEST_MOVE, Map, Name, Products, SideLength, Text, TooLate};
+use lager_lines::{Name, Products, Text};
+use lager_orders::Reason;
+use lager_orders::lease::{LATEST_MOVE, TooLate};
+use lager_plant::{Exit, Floor, NamedProduct, Warehouse};
 use lager_wire::OperatorCommand;
 
 use super::{Peer, Station};
 use crate::robot::{ActRefused, CommandRefused, Robot};
-use crate::warehouse::{StoredProduct, Warehouse, WarehouseError};
+use crate::warehouse;
 
-/// How long a GaG whose robot does something by its word may leave unread what it is told, and when
-/// it is asked again that has read everything. So a robot stands within half a second when its GaG
-/// has frozen, and the shell looks every 50 ms.
+/// How long a GaG may leave lines unread while its command moves the robot. A GaG that has read
+/// everything is asked again after this time. The server looks every 50 ms, so a robot stands
+/// within half a second when its GaG has frozen.
 const UNREAD: Duration = LATEST_MOVE;
 const ASKED_AGAIN: Duration = LATEST_MOVE;
 
-/// What it says.
+/// What the GaG says.
 impl Station {
     pub(super) fn gag_said(&mut self, late: Duration, line: &str) {
         if self.gag.is_none() {
@@ -55,15 +59,15 @@ impl Station {
         if let Some(name) = name
             && let Some(robot) = self.robots.get_mut(&name)
         {
-            // What the robot asks no more is passed over.
+            // The robot does not ask this any more: ignore it.
             let line = robot.given(answer).ok();
             self.say(&name, line);
             self.ask_gag(&name);
         }
     }
 
-    /// Lets a command wait that nobody has asked for; `None` where this is none, or no robot is
-    /// there.
+    /// Puts a command in the queue that the station has not asked for. `None` if this is not a
+    /// command, or if no robot is there.
     fn queue(&mut self, name: Option<Name>, answer: &Answer) -> Option<Result<(), CommandRefused>> {
         let name = name?;
         let robot = self.robots.get_mut(&name)?;
@@ -75,7 +79,7 @@ impl Station {
         Some(taken.map(|line| self.say(&name, line)))
     }
 
-    /// Who drives the GaG's robot by actions, where this would move it.
+    /// The person who drives the GaG's robot by actions, if this answer would move the robot.
     fn other_driver(&self, answer: &Answer) -> Option<String> {
         let Answer::Command(command) = answer else {
             return None;
@@ -87,14 +91,14 @@ impl Station {
         self.robots.get(name)?.driver().map(str::to_owned)
     }
 
-    /// Whether the GaG has read all that it has been told. To be told before a line of it is heard,
-    /// and again and again.
+    /// Tells the station whether the GaG has read every line. Call it before each line of the GaG,
+    /// and regularly.
     pub fn gag_has_read(&mut self, all: bool) {
         let Some(gag) = &mut self.gag else { return };
         if all {
             gag.unread = None;
             if gag.robot.is_some() && gag.is_told {
-                // It knows by now for whom it speaks.
+                // By now it knows for whom it speaks.
                 gag.may_mean = None;
             }
         } else {
@@ -102,21 +106,21 @@ impl Station {
         }
     }
 
-    /// Whether somebody waits to learn what the GaG has read.
+    /// Whether the station needs to know what the GaG has read.
     pub fn watches_gag(&self) -> bool {
         let gag = self.gag.as_ref();
         gag.is_some_and(|gag| gag.may_mean.is_some()) || self.drives_by_gag().is_some()
     }
 
-    /// The robot that does something by the GaG's word.
+    /// The robot that moves by a command of the GaG.
     fn drives_by_gag(&self) -> Option<&Name> {
         let name = self.gag.as_ref()?.robot.as_ref()?;
         let robot = self.robots.get(name)?;
         robot.is_commanded().then_some(name)
     }
 
-    /// Makes a robot stand whose GaG does not read. One that has read everything is asked again, so
-    /// that there is something to read.
+    /// Makes the robot of a GaG that does not read stand. A GaG that has read everything is asked
+    /// again, so that it always has something to read.
     pub(super) fn watch_gag(&mut self) {
         let Some(name) = self.drives_by_gag().cloned() else {
             return;
@@ -143,7 +147,7 @@ impl Station {
         }
     }
 
-    /// Drops what has waited for robots while the station was held up for so long.
+    /// Drops the commands that waited while the station was held up for so long.
     pub(super) fn forget_commands(&mut self, pause: Duration) {
         let waited = |(name, robot): (&Name, &mut Robot)| {
             let has_waited = robot.forget_commands();
@@ -155,7 +159,7 @@ impl Station {
         }
     }
 
-    /// Why this moves nobody: it may be meant for a robot for which the GaG speaks no more.
+    /// Why an answer moves no robot: the GaG may have meant the robot for which it spoke before.
     fn meant_for_another(&self, answer: &Answer) -> Option<String> {
         let gag = self.gag.as_ref()?;
         let before = gag.may_mean.as_ref()?;
@@ -169,7 +173,7 @@ impl Station {
         })
     }
 
-    /// It could not be saved; who described it is told.
+    /// The warehouse could not be saved. Tells the GaG that described it.
     pub fn not_saved(&mut self, why: &str) {
         if self.gag.is_some() {
             self.put(Peer::Gag, &thought(why));
@@ -184,7 +188,7 @@ impl Station {
         }
     }
 
-    /// Tells the GaG what is wrong, and asks again what is still asked.
+    /// Tells the GaG what is wrong, and repeats the open question.
     fn correct_gag(&mut self, why: &str) {
         self.put(Peer::Gag, &thought(why));
         if let Some(gag) = &mut self.gag {
@@ -195,8 +199,8 @@ impl Station {
         }
     }
 
-    /// Takes up what the GaG says of the warehouse, once all of it is known.
-    fn learn(&mut self, answer: &Answer) -> Result<(), WarehouseError> {
+    /// Uses what the GaG says of the warehouse, once the GaG has said all of it.
+    fn learn(&mut self, answer: &Answer) -> Result<(), Reason> {
         let Some(gag) = &mut self.gag else {
             return Ok(());
         };
@@ -210,7 +214,7 @@ impl Station {
             return Ok(());
         };
         let told = described(self.warehouse.as_ref(), side, map, products);
-        let checked = told.check();
+        let checked = warehouse::told(&told);
         if checked.is_err() {
             gag.products = None;
         }
@@ -222,14 +226,14 @@ impl Station {
     }
 }
 
-/// Who the GaG speaks for.
+/// For whom the GaG speaks.
 impl Station {
     /// Lets the GaG speak for the robot whose turn it is.
     pub(super) fn seat_gag(&mut self) {
         let first = self.first();
         let Some(gag) = &mut self.gag else { return };
         let (link, first) = first.unzip();
-        // A plain robot's name may be another one's by now, but no connection comes twice.
+        // Another robot may have a plain robot's name by now, but connections are never used twice.
         if gag.link == link && gag.robot == first {
             return;
         }
@@ -255,7 +259,7 @@ impl Station {
         self.ask_gag(&name);
     }
 
-    /// The GaG speaks for this robot no more.
+    /// The GaG does not speak for this robot any more.
     pub(super) fn unseat(&mut self, name: &Name) {
         if let Some(robot) = self.robots.get_mut(name) {
             let line = robot.set_gag(false);
@@ -263,7 +267,7 @@ impl Station {
         }
     }
 
-    /// Asks the GaG what its robot asks, if it has not been asked that already.
+    /// Asks the GaG the robot's question, unless the GaG has it already.
     pub(super) fn ask_gag(&mut self, name: &Name) {
         let Some(gag) = &mut self.gag else { return };
         if gag.robot.as_ref() != Some(name) {
@@ -285,30 +289,30 @@ pub(super) fn thought(why: &str) -> Request {
     Request::Telemetry(Telemetry::Thought(text.unwrap_or_default()))
 }
 
-/// The warehouse before with what a GaG says of it. Products keep the names they had.
+/// The warehouse of before, changed as a GaG says. Products keep their names.
 fn described(
     before: Option<&Warehouse>,
     side: SideLength,
-    map: Map,
+    map: Grid,
     products: &Products,
 ) -> Warehouse {
     let known = |id: i32| {
         let mut known = before.iter().flat_map(|before| &before.products);
         known.find(|product| product.id == id)
     };
-    let product = |product: &lager_lines::Product| StoredProduct {
+    let product = |product: &Product| NamedProduct {
         id: product.id.get(),
         name: known(product.id.get()).and_then(|known| known.name.clone()),
-        square: [product.square.x, product.square.y],
-        side: product.side.to_string(),
+        square: product.square,
+        side: product.side,
     };
     Warehouse {
-        size: [map.size().x, map.size().y],
+        size: map.size(),
         side_length_cm: side.cm(),
-        delivery: [map.delivery().x, map.delivery().y],
+        delivery: map.delivery(),
         products: products.as_slice().iter().map(product).collect(),
-        exit: before.and_then(|before| before.exit),
-        floor: before.and_then(|before| before.floor),
+        exit: before.map_or_else(Exit::default, |before| before.exit),
+        floor: before.map_or_else(Floor::default, |before| before.floor),
         obstacles: before.map_or_else(Vec::new, |before| before.obstacles.clone()),
     }
 }

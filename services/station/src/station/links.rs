@@ -1,13 +1,14 @@
-//! Who has which connection: names, proofs, and the places that there are.
+//! Which robot has which connection: names, proofs, and the limited number of places.
 //!
-//! - A name has one connection. A second one is refused as long as the first is alive, which both
-//!   and the people at the station are told; one that has been silent for [`LIVING`] is dead, and
-//!   gives its place to a robot that comes back.
-//! - There are [`Station::MOST_ROBOTS`] places, of which robots of one address that have not proved
-//!   their names have [`Station::MOST_OF_ONE_ADDRESS`] at most. Where there is none left, whoever
-//!   has proved who he is, or has been known for longer, gets the place of one who has not.
-//! - One that has announced itself repeats that every second. It is given up once it has been
-//!   silent for [`SILENT`].
+//! - A name has one connection. While it is alive, the station refuses a second one, and tells both
+//!   robots and the people at the station. After [`LIVING`] of silence a connection is dead, and a
+//!   robot that connects again takes its place.
+//! - There are [`Station::MOST_ROBOTS`] places. Robots of one address that have not proved their
+//!   names get at most [`Station::MOST_OF_ONE_ADDRESS`] of them. When no place is left, a robot
+//!   that has proved its name takes the place of one that has not. A robot that the station has
+//!   known for longer does the same.
+//! - A robot that has announced itself repeats that every second. After [`SILENT`] without a line
+//!   the station closes its connection.
 
 use std::net::IpAddr;
 use std::time::Duration;
@@ -24,7 +25,7 @@ use super::{Peer, Station};
 const LIVING: Duration = Duration::from_secs(1);
 /// How long a robot that has announced itself may say nothing.
 const SILENT: Duration = Duration::from_secs(30);
-/// How often people are told of somebody else by the name of a robot.
+/// How often people hear that another robot says the same name.
 const TOLD: Duration = Duration::from_secs(10);
 
 /// A connection of a robot.
@@ -34,24 +35,24 @@ pub(super) struct Link {
     pub(super) name: Option<Name>,
     from: Option<IpAddr>,
     is_proved: bool,
-    /// When it was heard last.
+    /// When it said something last.
     heard: Duration,
-    /// When it was told of somebody else by its name.
+    /// When it was told last that another robot says its name.
     told: Option<Duration>,
 }
 
-/// What is known of a name.
+/// What the station knows of a name.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
     /// Since when.
     since: Duration,
-    /// A robot has announced itself by it, so that no robot without a name is called so.
+    /// A robot has announced itself by this name, so no robot without a name may get it.
     is_announced: bool,
     is_proved: bool,
 }
 
 impl Station {
-    /// Connections of robots at one address that have not proved their names, at most.
+    /// How many connections of robots at one address may have no proof of their names.
     pub const MOST_OF_ONE_ADDRESS: usize = 16;
 
     /// Where a robot's connection comes from.
@@ -61,25 +62,25 @@ impl Station {
         }
     }
 
-    /// The robot at this connection has proved the name that it says next.
+    /// The robot at this connection has proved the name that its next line says.
     pub fn proved(&mut self, link: u64) {
         if let Some(link) = self.links.get_mut(&link) {
             link.is_proved = true;
         }
     }
 
-    /// Asks a peer for a proof, or proves to it who this is.
+    /// Sends a peer the question for its proof, or the station's own proof.
     pub fn prove(&mut self, peer: Peer, proof: &Proof) {
         self.put(peer, proof);
     }
 
-    /// Whether a robot speaks by this connection.
+    /// Whether a robot has said something by this connection.
     pub fn is_seated(&self, link: u64) -> bool {
         let link = self.links.get(&link);
         link.is_some_and(|link| link.name.is_some())
     }
 
-    /// Refuses a peer that is none of the robots yet; it is told why.
+    /// Refuses a peer that has not become a robot, and tells it why.
     pub fn refuse(&mut self, peer: Peer, why: &str) {
         self.put(peer, &thought(why));
         self.close(peer, why.to_owned());
@@ -94,22 +95,22 @@ impl Station {
         self.links.insert(link, link_of);
     }
 
-    /// The robot at this connection has said something; its name if it has one.
+    /// The robot at this connection has said something. Returns its name if it has one.
     pub(super) fn hears(&mut self, link: u64) -> Option<Option<Name>> {
         let link = self.links.get_mut(&link)?;
         link.heard = self.now;
         Some(link.name.clone())
     }
 
-    /// The connection by which this robot speaks.
+    /// The connection of this robot.
     pub(super) fn link_of(&self, name: &Name) -> Option<u64> {
         let mut links = self.links.iter();
         let found = links.find(|(_, link)| link.name.as_ref() == Some(name));
         found.map(|(&link, _)| link)
     }
 
-    /// Whom a GaG speaks for: the one that has been connected for longest, of those that have
-    /// proved who they are if there has been any.
+    /// The robot for which a GaG speaks: the one that has been connected for the longest time. If
+    /// any robot has proved its name, only such robots count.
     pub(super) fn first(&self) -> Option<(u64, Name)> {
         let is_asked = self.known.values().any(|known| known.is_proved);
         let mut links = self.links.iter();
@@ -120,7 +121,7 @@ impl Station {
         })
     }
 
-    /// Gives up robots that have announced themselves and say nothing.
+    /// Closes the connections of announced robots that have fallen silent.
     pub(super) fn give_up_silent(&mut self) {
         let is_silent = |link: &Link| {
             let robot = link.name.as_ref().and_then(|name| self.robots.get(name));
@@ -174,7 +175,7 @@ impl Station {
         robot.turn(self.now);
         robot.connected();
         if let Some(warehouse) = &self.warehouse {
-            // It has been checked, and nothing is asked yet.
+            // The name has been checked, and the robot has asked nothing yet.
             let _ = robot.set_warehouse(warehouse);
         }
         if let Some(link) = self.links.get_mut(&link) {
@@ -184,7 +185,7 @@ impl Station {
         Ok(name)
     }
 
-    /// A robot by this name is known from now on, if it was not before.
+    /// Adds a name that the station does not know yet.
     pub(super) fn knows(&mut self, name: &Name) {
         let since = self.now;
         self.known.entry(name.clone()).or_insert(Known {

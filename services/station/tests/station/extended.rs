@@ -4,9 +4,9 @@
 use std::time::Duration;
 
 use lager_lines::Name;
-use lager_lines::command::{Wheels, read_arm, read_wheels};
-use lager_lines::extension::{Action, Mode};
-use lager_station::{ActRefused, Output, Peer, Reply, Station, Told, Wish, WishRefused};
+use lager_lines::command::{read_arm, read_wheels};
+use lager_orders::{Action, Mode, Wheels};
+use lager_station::{ActRefused, Output, Peer, Reply, Saying, Station, Wish, WishRefused};
 use lager_wire::OperatorCommand;
 
 use crate::transcript::warehouse;
@@ -50,7 +50,7 @@ fn extended() -> Station {
 /// The answers among the news.
 fn replies(station: &mut Station) -> Vec<(u32, Reply)> {
     let reply = |told| match told {
-        Told::Replied { number, reply } => Some((number, reply)),
+        Saying::Replied { number, reply } => Some((number, reply)),
         _ => None,
     };
     let news = station.news().into_iter();
@@ -140,9 +140,9 @@ fn what_it_shows_is_kept_with_its_time_and_events_are_news() {
         station.heard(LINK, Ok(line));
     }
     station.turn(at(1_250));
-    let told: Vec<Told> = station.news().into_iter().map(|news| news.told).collect();
+    let told: Vec<Saying> = station.news().into_iter().map(|news| news.told).collect();
     assert!(
-        matches!(told[..], [Told::Event(_), Told::Thought(_)]),
+        matches!(told[..], [Saying::Event(_), Saying::Thought(_)]),
         "{told:?}"
     );
     let now = station.now();
@@ -184,7 +184,7 @@ fn one_drives_and_the_next_is_refused_with_his_name() {
     // Nobody drives without the seat, and anybody stops.
     let around = Action::Drive {
         wheels: wheels("2"),
-        lease: lager_lines::extension::LeaseMs::new(100).expect("a time"),
+        lease: lager_orders::LeaseMs::new(100).expect("a time"),
     };
     assert_eq!(
         station.act(&r1(), around),

@@ -4,8 +4,10 @@ use std::fs;
 use std::os::unix::fs::{PermissionsExt as _, symlink};
 use std::path::{Path, PathBuf};
 
+use lager_floor::Node;
 use lager_lines::Called;
-use lager_station::{LoadError, SaveError, load, save};
+use lager_plant::{NamedProduct, Warehouse};
+use lager_station::{LoadError, SaveError, find, load, save, told};
 
 use crate::transcript::{WAREHOUSE, product, warehouse};
 
@@ -46,7 +48,12 @@ fn what_was_saved_is_read() {
     let folder = Folder::new("saved");
     fs::write(folder.file(), WAREHOUSE).expect("a file");
     let mut warehouse = load(&folder.file()).expect("a warehouse");
-    let find = |text: &str| warehouse.find(&text.parse::<Called>().expect("a name or a number"));
+    let find = |text: &str| {
+        find(
+            &warehouse,
+            &text.parse::<Called>().expect("a name or a number"),
+        )
+    };
     assert_eq!(find("screws"), Ok(product(7)));
     assert_eq!(find("12"), Ok(product(12)));
     for unknown in ["nails", "13"] {
@@ -56,7 +63,7 @@ fn what_was_saved_is_read() {
     }
 
     warehouse.products.pop();
-    warehouse.delivery = [4, 3];
+    warehouse.delivery = Node::new(4, 3);
     save(&folder.file(), &warehouse).expect("saved");
     assert_eq!(load(&folder.file()).expect("a warehouse"), warehouse);
     assert_eq!(
@@ -114,25 +121,25 @@ fn a_warehouse_that_cannot_be_is_refused_in_a_sentence() {
     let change = |from: &str, to: &str| {
         let text = WAREHOUSE.replacen(from, to, 1);
         assert_ne!(text, WAREHOUSE, "{from} is not in it");
-        let warehouse: lager_station::Warehouse = toml::from_str(&text).expect("TOML");
-        warehouse.check().expect_err(to).to_string()
+        let warehouse: Warehouse = toml::from_str(&text).expect("TOML");
+        told(&warehouse).expect_err(to).to_string()
     };
     for (from, to, sentence) in [
         (
             "[4, 3]",
             "[0, 3]",
-            "a warehouse of 0 x 3 squares has none; each must be from 1 to 255",
+            "the size is 0 x 3 squares; each must be from 1 to 99",
         ),
         (
             "= 40",
-            "= 0",
-            "side_length_cm is 0; it must be from 1 to 65535 cm",
+            "= 39",
+            "a square's side is 39 cm; it must be from 40 to 500 cm",
         ),
         (
             "delivery = [0, 0]",
             "delivery = [1, 0]",
-            "(1, 0) is no corner of the warehouse; \
-             the delivery is at (0, 0), (0, 3), (4, 0) or (4, 3)",
+            "the delivery is at (1, 0), which is no corner of the floor; \
+             its corners are (0, 0), (0, 3), (4, 0) and (4, 3)",
         ),
         (
             "id = 7",
@@ -145,30 +152,25 @@ fn a_warehouse_that_cannot_be_is_refused_in_a_sentence() {
             "product 12 is listed twice; every product needs a number of its own",
         ),
         (
-            "\"down\"",
-            "\"south\"",
-            "product 7 is reached from \"south\"; write left, up, right or down",
-        ),
-        (
             "[1, 0]",
             "[4, 0]",
-            "product 7 stands in the square [4, 0], but the last one is [3, 2]",
+            "product 7 stands in the square (4, 0), but the last one is (3, 2)",
         ),
         (
             "id = 12",
             "id = 12\nname = \"screws\"",
-            "two products are named \"screws\"; every name needs to be another one",
+            "two products are named screws; give each product a name of its own",
         ),
         (
             "\"screws\"",
             "\"12\"",
-            "a product is named \"12\", which would be taken for its number; use a letter",
+            "a product is named 12, which people would take for its number; use a letter",
         ),
         (
             "\"screws\"",
             "\"screws, M4\"",
-            "a product is named \"screws, M4\": \"screws, M4\" cannot stand for a product; it must have \
-             a character and neither comma, semicolon, line break nor a blank at its ends",
+            "a product is named screws, M4, which cannot stand for a product: a name has a letter and \
+             neither comma, semicolon, line break nor a blank at its ends",
         ),
     ] {
         assert_eq!(change(from, to), sentence);
@@ -180,10 +182,10 @@ fn more_products_than_fit_in_a_line_are_refused() {
     let mut many = warehouse();
     let one = many.products[1].clone();
     many.products = (0..100)
-        .map(|id| lager_station::StoredProduct { id, ..one.clone() })
+        .map(|id| NamedProduct { id, ..one.clone() })
         .collect();
     assert_eq!(
-        many.check().expect_err("too many").to_string(),
+        told(&many).expect_err("too many").to_string(),
         "the warehouse has 100 products, which do not fit in one line of the robot's language; \
          list fewer"
     );

@@ -83,7 +83,10 @@ fn a_session_of_a_plain_robot_with_a_gag() {
         ],
     );
     let learned = station.unsaved().expect("another warehouse");
-    assert_eq!((learned.size, learned.products[0].id), ([2, 1], 3));
+    assert_eq!(
+        (learned.size, learned.products[0].id),
+        (lager_floor::Node::new(2, 1), 3)
+    );
     assert_eq!(station.unsaved(), None);
 }
 
@@ -124,7 +127,7 @@ fn goods_outside_the_map_are_refused_and_the_warehouse_stays() {
     station.heard(Peer::Gag, Ok("prodlis 1 3 9 0 up"));
     let answer = said(&mut station);
     assert!(
-        answer[0].contains("stands in the square [9, 0]"),
+        answer[0].contains("stands in the square (9, 0)"),
         "{answer:?}"
     );
     assert_eq!(answer[1], "gag: prodlis");

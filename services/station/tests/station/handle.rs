@@ -5,8 +5,9 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::command::read_wheels;
-use lager_lines::extension::{Action, Mode};
-use lager_station::{Handle, Reply, Subscription, Told, Warehouse, Wish, WishRefused};
+use lager_orders::{Action, Mode};
+use lager_plant::Warehouse;
+use lager_station::{Handle, Reply, Saving, Saying, Subscription, Wish, WishRefused};
 
 use crate::sockets::{Peer, Running, WATCHDOG};
 use crate::transcript::{product, warehouse};
@@ -118,8 +119,8 @@ fn states_come_with_their_age_and_events_to_whoever_has_subscribed() {
 
     let told = [(); 2].map(|()| news.next(WATCHDOG).expect("news"));
     assert!(told.iter().all(|news| news.robot == r1()));
-    assert!(matches!(told[0].told, Told::Event(_)), "{told:?}");
-    assert!(matches!(&told[1].told, Told::Thought(text) if text.as_str() == "hej"));
+    assert!(matches!(told[0].told, Saying::Event(_)), "{told:?}");
+    assert!(matches!(&told[1].told, Saying::Thought(text) if text.as_str() == "hej"));
     assert_eq!(news.next(Duration::ZERO), None);
 
     // Whoever comes later can have what was said before, with its time.
@@ -153,7 +154,7 @@ fn goods_that_a_robot_has_seen_to_be_gone_are_not_ordered_from_it() {
     assert_eq!(
         why(fetch(7)),
         "product 7 is not in its place, as robot r1 has seen; put it back and say \
-         `lager map back 7`"
+         that it is there"
     );
     assert_eq!(why(fetch(12)), "product 12 is ordered already");
     robot.says(b"gone 0\nstate product=12\n");
@@ -164,6 +165,12 @@ fn goods_that_a_robot_has_seen_to_be_gone_are_not_ordered_from_it() {
     fetch(7).expect("it is back");
 }
 
+/// What a page is told of a warehouse that is saved, as one sentence.
+fn told(saving: &Saving) -> String {
+    let told: Vec<_> = saving.told().map(|told| told.to_string()).collect();
+    told.join("; ")
+}
+
 #[test]
 fn who_saves_a_warehouse_is_told_what_a_robot_does_that_knows_another_one() {
     let station = Running::new();
@@ -171,7 +178,7 @@ fn who_saves_a_warehouse_is_told_what_a_robot_does_that_knows_another_one() {
     let save = |warehouse: &Warehouse| {
         let saving = handle.set_warehouse(warehouse.clone()).expect("it can be");
         assert_eq!(saving.wait(WATCHDOG), Some(Ok(())));
-        let sentence = saving.sentence();
+        let sentence = told(&saving);
         let saved = format!(
             "saved in {}",
             station.folder().join("warehouse.toml").display()
@@ -195,14 +202,14 @@ fn who_saves_a_warehouse_is_told_what_a_robot_does_that_knows_another_one() {
     changed.side_length_cm = 60;
     assert_eq!(
         save(&changed),
-        "; r1 still uses the floor of before, until it is put on the delivery node and \
-         `lager up` is started again"
+        "; r1 still uses the earlier floor, until it is put on the delivery node and \
+         started again"
     );
     robot.says(b"truth 0 0 90 -\n");
     wait_for(handle, |view| view.shown.truth.as_ref().map(drop));
     assert_eq!(
         save(&changed),
-        "; r1 is simulated and still drives in the warehouse of before, until `lager up` is \
+        "; r1 is simulated and still drives in the earlier warehouse, until it is \
          started again"
     );
 }
@@ -217,7 +224,7 @@ fn a_real_robot_asks_for_goods_that_have_changed() {
     let mut changed = warehouse();
     changed.products.pop();
     let saving = station.handle.set_warehouse(changed).expect("it can be");
-    let sentence = saving.sentence();
+    let sentence = told(&saving);
     assert!(
         sentence.ends_with("; r1 is told where the goods are"),
         "{sentence}"

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lager_lines::Name;
 use lager_lines::command::read_wheels;
-use lager_lines::extension::{Action, Mode};
+use lager_orders::{Action, Mode};
 use lager_station::{ActRefused, Given, Output, Peer, Station};
 
 use crate::sockets::Running;

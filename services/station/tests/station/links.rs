@@ -4,7 +4,7 @@ use std::net::IpAddr;
 use std::time::Duration;
 
 use lager_lines::Name;
-use lager_station::{Output, Peer, Station, Told};
+use lager_station::{Output, Peer, Saying, Station};
 
 const HERE: [u8; 4] = [127, 0, 0, 1];
 
@@ -69,7 +69,7 @@ fn a_second_connection_by_the_name_of_a_living_robot_is_refused_and_both_are_tol
     // Whoever looks at the robot reads it.
     let news = station.news();
     assert_eq!(news.len(), 1, "{news:?}");
-    assert!(matches!(&news[0].told, Told::Thought(why) if why.as_str().contains("is refused")));
+    assert!(matches!(&news[0].told, Saying::Thought(why) if why.as_str().contains("is refused")));
     // The robot has lost nothing, and is the one that is stopped.
     station.stop(&name("r1")).expect("it is there");
     assert_eq!(says(&mut station, 1, "set_robot 1 0"), ["1: stop 1"]);

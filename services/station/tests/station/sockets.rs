@@ -183,7 +183,7 @@ fn what_a_gag_describes_is_saved() {
     let mut robot = station.robot();
     let mut gag = station.gag();
     for (question, answer) in [
-        ("sidelength", "sidelength 30"),
+        ("sidelength", "sidelength 50"),
         ("karta", "karta 2 2 2 0"),
         ("prodlist", "prodlist 1 7 1 1 up"),
     ] {
@@ -196,13 +196,13 @@ fn what_a_gag_describes_is_saved() {
     let start = std::time::Instant::now();
     let saved = loop {
         let saved = load(&file).expect("a whole file at any time");
-        if saved.size == [2, 2] {
+        if saved.size == lager_floor::Node::new(2, 2) {
             break saved;
         }
         assert!(start.elapsed() < WATCHDOG, "it is not saved");
         std::thread::yield_now();
     };
-    assert_eq!(saved.side_length_cm, 30);
+    assert_eq!(saved.side_length_cm, 50);
     assert_eq!(saved.products[0].name.as_deref(), Some("screws"));
 }
 

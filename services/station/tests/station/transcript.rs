@@ -1,9 +1,10 @@
 //! A robot played by its lines.
 
-use lager_lines::ProductId;
+use lager_floor::ProductId;
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::to_line;
-use lager_station::{Robot, Warehouse};
+use lager_plant::Warehouse;
+use lager_station::Robot;
 
 /// A warehouse of 4 x 3 squares with the products 7 and 12.
 pub(crate) const WAREHOUSE: &str = r#"

@@ -142,7 +142,7 @@ fn undefined_codes_are_refused_counted_and_change_nothing() {
 fn an_order_from_nobody_is_refused() {
     let mut bench = Bench::manual();
     let mut order = drive(Origin::Operator, 1, FORWARD);
-    order.origin = lager_topics::Tag::from_raw(9);
+    order.origin = lager_sample::Tag::from_raw(9);
     assert_eq!(bench.give(order), Verdict::Refused(Refusal::Undefined));
     bench.run(50);
     assert!(!code_moves(bench.board.code));

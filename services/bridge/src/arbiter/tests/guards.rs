@@ -96,7 +96,7 @@ fn a_board_that_has_restarted_is_told_a_standby_before_anything_else() {
     let mut bench = Bench::manual();
     bench.run_renewed(300, drive(Origin::Operator, 1, ARM_UP));
     bench.arbiter.board_down();
-    bench.board = Board::new();
+    bench.board = board();
     bench.arbiter.board_up(bench.now, Version::One, true);
     bench.written.clear();
     let order = drive(Origin::Operator, 2, ARM_UP);

@@ -21,7 +21,7 @@ fn a_lease_ends_120_ms_after_the_last_renewal_and_not_before() {
         .copied()
         .unwrap();
     assert_eq!(halt.command(), Some(STANDBY));
-    assert_eq!(halted_at.checked_sub(renewed_at).unwrap(), LEASE);
+    assert_eq!(halted_at.checked_sub(renewed_at).unwrap(), SETPOINT);
     assert_eq!(bench.ended(), Some((Origin::Operator, 1, Finish::Aborted)));
     assert_eq!(bench.health().leases_expired, 1);
 }
@@ -39,10 +39,10 @@ fn sending_again_does_not_extend_a_lease() {
 #[test]
 fn an_order_that_lay_in_a_queue_is_as_old_as_it_is() {
     let mut bench = Bench::manual();
-    let stale = bench.now.checked_sub(LEASE).unwrap();
+    let stale = bench.now.checked_sub(SETPOINT).unwrap();
     bench
         .arbiter
-        .order(stale, LEASE, &drive(Origin::Operator, 1, FORWARD));
+        .order(stale, SETPOINT, &drive(Origin::Operator, 1, FORWARD));
     bench.run(200);
     assert!(!bench.board.executed.contains(&FORWARD.code()));
 }
@@ -108,7 +108,7 @@ fn renewals_that_come_after_a_pause_of_the_bridge_take_nothing_up() {
 
 #[test]
 fn what_was_read_too_late_is_refused_whoever_gave_it_but_a_standby() {
-    let late = STALE + ms(1);
+    let late = LATEST_MOVE + ms(1);
     for (origin, command) in [
         (Origin::Operator, LEFT_DIAG),
         (Origin::Operator, ARM_UP),
@@ -122,7 +122,7 @@ fn what_was_read_too_late_is_refused_whoever_gave_it_but_a_standby() {
             let order = drive(origin, id, command);
             bench.arbiter.order(bench.now, age, &order)
         };
-        assert_eq!(give(1, STALE, command), Verdict::Executes);
+        assert_eq!(give(1, LATEST_MOVE, command), Verdict::Executes);
         let refused = match origin {
             Origin::Operator => Verdict::Refused(Refusal::Stale),
             // It renews, and its next sample is as old as it is.

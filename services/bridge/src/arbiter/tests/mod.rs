@@ -7,101 +7,17 @@ mod restarts;
 mod silence;
 mod writing;
 
-use lager_topics::{Finish, Health, Mode, Origin, Refusal, SteeringOrder};
-use lager_wire::{ArmCommand, Command, SteerCommand, SteerData, SteerFlags, Version, WheelCommand};
+use lager_orders::Mode;
+use lager_orders::lease::{LATEST_MOVE, RENEWAL, SETPOINT, UNHEARD};
+use lager_rig::boards::Register;
+use lager_topics::{Finish, Health, Origin, Refusal, SteeringOrder};
+use lager_wire::{ArmCommand, Command, SteerCommand, SteerFlags, Version, WheelCommand};
 
 use super::*;
 
-/// What the steering board does with commands, as far as the arbiter can tell (T2, T4): a new
-/// sequence byte executes, the same renews, a command older than 150 ms is given up.
-#[derive(Clone, Debug)]
-struct Board {
-    last_seq: Option<u8>,
-    code: u8,
-    heard: Duration,
-    one_shot_ends: Option<Duration>,
-    failsafe: bool,
-    finished_seq: u8,
-    finish: SteerFlags,
-    /// Every command executed, in order.
-    executed: Vec<u8>,
-    /// How many one-shots ran to their end.
-    completed: usize,
-}
-
-impl Board {
-    fn new() -> Self {
-        Self {
-            last_seq: None,
-            code: 0,
-            heard: Duration::ZERO,
-            one_shot_ends: None,
-            failsafe: false,
-            finished_seq: 0,
-            finish: SteerFlags::NONE,
-            executed: Vec::new(),
-            completed: 0,
-        }
-    }
-
-    fn take(&mut self, now: Duration, command: SteerCommand) {
-        self.heard = now;
-        if self.last_seq == Some(command.seq) {
-            return;
-        }
-        self.end_one_shot(SteerFlags::ABORTED);
-        self.last_seq = Some(command.seq);
-        self.failsafe = false;
-        let meaning = command.command().expect("the arbiter sends defined codes");
-        if matches!(meaning, Command::Arm(_)) && code_moves(self.code) {
-            self.finished_seq = command.seq;
-            self.finish = SteerFlags::REFUSED;
-            return;
-        }
-        self.code = command.code;
-        self.executed.push(command.code);
-        if meaning.is_one_shot() {
-            let lasts = if moves(meaning) { 3_000 } else { 300 };
-            self.one_shot_ends = Some(now + ms(lasts));
-        }
-    }
-
-    fn end_one_shot(&mut self, how: SteerFlags) {
-        if self.one_shot_ends.take().is_some() {
-            self.finished_seq = self.last_seq.unwrap();
-            self.finish = how;
-            self.code = STANDBY.code();
-        }
-    }
-
-    fn step(&mut self, now: Duration) -> SteerData {
-        if now - self.heard > ms(150) && self.last_seq.is_some() {
-            self.failsafe = true;
-            self.end_one_shot(SteerFlags::ABORTED);
-            self.code = STANDBY.code();
-        }
-        if self.one_shot_ends.is_some_and(|end| end <= now) {
-            self.end_one_shot(SteerFlags::NONE);
-            self.completed += 1;
-        }
-        let mut flags = self.finish;
-        if self.failsafe {
-            flags.insert(SteerFlags::FAILSAFE);
-        }
-        if self.one_shot_ends.is_some() {
-            flags.insert(SteerFlags::BUSY);
-        }
-        SteerData {
-            code: self.code,
-            left_duty: if code_moves(self.code) { 100 } else { 0 },
-            right_duty: if code_moves(self.code) { 100 } else { 0 },
-            flags,
-            line_error: 0,
-            finished_seq: self.finished_seq,
-            servo_errors: 0,
-            battery_decivolts: 0,
-        }
-    }
+/// A board whose turns take three seconds, and steps of its arm 300 ms.
+fn board() -> Register {
+    Register::new(ms(3_000), ms(300))
 }
 
 fn code_moves(code: u8) -> bool {
@@ -145,7 +61,7 @@ const DROP: Command = Command::Arm(ArmCommand::Drop);
 /// An arbiter wired to a board, both stepped every millisecond.
 struct Bench {
     arbiter: Arbiter,
-    board: Board,
+    board: Register,
     now: Duration,
     /// Everything written, with its time.
     written: Vec<(Duration, SteerCommand)>,
@@ -158,7 +74,7 @@ impl Bench {
         arbiter.set_mode(mode);
         let mut bench = Self {
             arbiter,
-            board: Board::new(),
+            board: board(),
             now: ms(1_000),
             written: Vec::new(),
             connected: true,

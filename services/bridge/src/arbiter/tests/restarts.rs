@@ -7,14 +7,14 @@ fn a_rebooted_board_drives_on_by_a_live_setpoint_but_repeats_no_turn() {
     let mut bench = Bench::autonomous();
     let order = drive(Origin::Logic, 1, FOLLOW);
     bench.run_renewed(50, order);
-    bench.board = Board::new();
+    bench.board = board();
     bench.arbiter.board_up(bench.now, Version::One, true);
     bench.run_renewed(50, order);
     assert_eq!(bench.board.code, FOLLOW.code());
 
     let turn = drive(Origin::Logic, 2, LEFT_PERP);
     bench.run_renewed(500, turn);
-    bench.board = Board::new();
+    bench.board = board();
     bench.arbiter.board_up(bench.now, Version::One, true);
     bench.run_renewed(500, turn);
     assert_eq!(bench.ended(), Some((Origin::Logic, 2, Finish::Aborted)));
@@ -27,7 +27,7 @@ fn a_reset_or_a_renewed_link_ends_what_a_person_drove() {
         let mut bench = Bench::manual();
         let order = drive(Origin::Operator, 1, FORWARD);
         bench.run_renewed(50, order);
-        bench.board = Board::new();
+        bench.board = board();
         bench.arbiter.board_down();
         bench.arbiter.board_up(bench.now, Version::One, rebooted);
         bench.run_renewed(200, order);
@@ -138,7 +138,7 @@ fn a_turn_that_vanished_with_an_unplugged_board_is_not_repeated() {
     bench.connected = false;
     bench.arbiter.board_down();
     bench.run_renewed(500, turn);
-    bench.board = Board::new();
+    bench.board = board();
     bench.connected = true;
     // A port that comes back cannot tell that its board has lost its power meanwhile.
     bench.arbiter.board_up(bench.now, Version::One, false);
@@ -348,7 +348,7 @@ fn no_mixture_of_events_moves_the_robot_without_a_live_order() {
                     restarted = bench.now;
                 }
                 6 => {
-                    bench.board = Board::new();
+                    bench.board = board();
                     bench.arbiter.board_up(bench.now, Version::One, true);
                 }
                 _ => {
@@ -376,7 +376,7 @@ fn no_mixture_of_events_moves_the_robot_without_a_live_order() {
                 assert_eq!(by_operator, bench.arbiter.mode() == Mode::Manual);
                 let word = words[&(by_operator, key.id)];
                 assert!(
-                    bench.now <= word + LEASE + ms(1),
+                    bench.now <= word + SETPOINT + ms(1),
                     "moving {:?} after the last word",
                     bench.now.checked_sub(word)
                 );

@@ -43,7 +43,7 @@ fn an_unheard_board_is_stopped_after_200_ms_and_stays_so_whoever_renews() {
             .find(|(_, command)| command.command() == Some(STANDBY))
             .copied()
             .unwrap();
-        assert_eq!(halted.checked_sub(last_report).unwrap(), REPORT_DEADLINE);
+        assert_eq!(halted.checked_sub(last_report).unwrap(), UNHEARD);
         assert!(
             bench
                 .written

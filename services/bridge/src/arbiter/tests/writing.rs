@@ -141,7 +141,7 @@ fn an_original_board_is_told_each_moving_command_once_and_standby_again_and_agai
             .all(|(_, command)| command.command() == Some(STANDBY))
     });
     assert!(standing.clone().count() > 10);
-    assert!(standing.map(pause).all(|pause| pause == RESEND));
+    assert!(standing.map(pause).all(|pause| pause == RENEWAL));
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn what_an_original_board_reports_ends_no_order() {
     arbiter.order(ms(0), Duration::ZERO, &drive(Origin::Operator, 1, ARM_UP));
     turn(&mut arbiter, ms(0));
     for seq in 0..=u8::MAX {
-        let mut data = Board::new().step(ms(1));
+        let mut data = board().step(ms(1));
         data.finished_seq = seq;
         data.flags = SteerFlags(0xFF);
         arbiter.observe(ms(1), &data);
@@ -257,7 +257,7 @@ fn the_next_due_time_misses_nothing() {
     let mut lazy = eager.arbiter.clone();
     let order = drive(Origin::Operator, 1, FORWARD);
     eager.written.clear();
-    eager.board = Board::new();
+    eager.board = board();
     eager.connected = false;
     let start = eager.now;
     eager.give(order);

@@ -9,32 +9,29 @@
     reason = "each test program uses a part of it"
 )]
 
-mod board;
-mod original;
-mod pty;
-mod steering;
-
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use lager_bridge::BridgeError;
 use lager_bridge::{BridgeConfig, buttons};
-use lager_ports::{
-    Bus, BusConfig, Cause, Client, Clock, PortError, Publisher, Shutdown, Stop, StopPage, StopTold,
-    StopWord, Subscriber,
-};
+use lager_home::Clock;
+use lager_orders::Mode;
+use lager_ports::{Bus, BusConfig, Cause, Client, Publisher, Subscriber};
 use lager_rig::Domain;
+use lager_sample::Topic;
+use lager_stop::{Stop, StopPage, StopTold, StopWord};
 use lager_topics::{
-    Answer, Ask, AskKind, BridgeRequest, DistanceFrame, Finish, Health, LineFrame, LinkHealth,
-    Mode, Origin, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder, SteeringReport,
-    SteeringState, StopCause, Topic,
+    Ask, AskKind, BridgeAnswer, BridgeRequest, DistanceFrame, Finish, Health, LineFrame,
+    LinkHealth, Origin, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder,
+    SteeringReport, SteeringState, StopCause,
 };
+use lager_wake::Shutdown;
 use lager_wire::{ArmCommand, Command, WheelCommand};
 
-pub(crate) use board::{Board, Peer, SensorBoard};
-pub(crate) use original::{OriginalSensor, OriginalSteering};
-pub(crate) use pty::Pty;
-pub(crate) use steering::SteeringBoard;
+pub(crate) use lager_rig::boards::{
+    OriginalSensor, OriginalSteering, Peer, Plugged, Pty, SensorBoard, SteeringBoard,
+};
 
 /// How fast the robot's clock runs: slower than real, so that a busy machine does not keep a
 /// lease of 120 ms from being renewed.
@@ -93,7 +90,7 @@ impl Isolation {
 /// The bridge in a thread.
 pub(crate) struct Bridge {
     shutdown: Shutdown,
-    thread: Option<JoinHandle<Result<(), PortError>>>,
+    thread: Option<JoinHandle<Result<(), BridgeError>>>,
 }
 
 impl Bridge {
@@ -207,7 +204,7 @@ impl Hands {
         Self {
             orders: bus.publisher().unwrap(),
             requests: bus.client().unwrap(),
-            stop_word: bus.place().robot(bus.robot()).join(StopPage::FILE),
+            stop_word: bus.home().unit(bus.unit()).join(StopPage::FILE),
             line: Seen::new(bus),
             distance: Seen::new(bus),
             state: Seen::new(bus),
@@ -259,11 +256,11 @@ impl Hands {
         }
     }
 
-    pub(crate) fn ask(&self, ask: Ask) -> Answer {
+    pub(crate) fn ask(&self, ask: Ask) -> BridgeAnswer {
         self.requests.call(ask, PATIENCE).unwrap()
     }
 
-    pub(crate) fn set_mode(&self, mode: Mode) -> Answer {
+    pub(crate) fn set_mode(&self, mode: Mode) -> BridgeAnswer {
         self.ask(Ask {
             kind: AskKind::SetMode.into(),
             mode: mode.into(),
@@ -271,7 +268,7 @@ impl Hands {
         })
     }
 
-    pub(crate) fn resume(&self) -> Answer {
+    pub(crate) fn resume(&self) -> BridgeAnswer {
         self.ask(Ask {
             kind: AskKind::Resume.into(),
             stop_word: self.stop_told().stop().map_or(0, Stop::word),
@@ -339,8 +336,8 @@ impl Hands {
 pub(crate) struct Robot<A: Peer = SensorBoard, B: Peer = SteeringBoard> {
     pub(crate) bridge: Option<Bridge>,
     pub(crate) hands: Hands,
-    pub(crate) sensor: Board<A>,
-    pub(crate) steering: Board<B>,
+    pub(crate) sensor: Plugged<A>,
+    pub(crate) steering: Plugged<B>,
     pub(crate) bridge_config: BridgeConfig,
     pub(crate) isolation: Isolation,
 }
@@ -370,8 +367,8 @@ impl<A: Peer, B: Peer> Robot<A, B> {
     /// Boards that run, and no bridge yet.
     pub(crate) fn with(sensor: A, steering: B) -> Self {
         let isolation = Isolation::new();
-        let sensor = Board::plugged(sensor, isolation.folder().join("sensor"));
-        let steering = Board::plugged(steering, isolation.folder().join("steering"));
+        let sensor = Plugged::new(sensor, isolation.folder().join("sensor"), SPEED);
+        let steering = Plugged::new(steering, isolation.folder().join("steering"), SPEED);
         let bridge_config = BridgeConfig {
             ports: [sensor.path().to_owned(), steering.path().to_owned()],
             ..BridgeConfig::default()

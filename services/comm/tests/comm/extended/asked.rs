@@ -2,9 +2,11 @@
 //! is told its place.
 
 use lager_comm::Senses;
+use lager_floor::Heading;
+use lager_orders::{Mode, Reason};
 use lager_topics::{
-    AskKind, CalibratedSensor, Calibration, Heading, InputKind, Mode, NavigatorStatus, Outcome,
-    Phase, WorldAnswer, WorldAskKind, WorldRefusal,
+    AskKind, CalibratedSensor, Calibration, InputKind, NavigatorStatus, Outcome, Phase,
+    WorldAnswer, WorldAskKind, WorldRefusal,
 };
 
 use super::{done, extended, pass};
@@ -116,7 +118,7 @@ fn obstacles_are_put_into_a_simulated_world() {
     );
     robot.hears(&["do 2 obstacle take 2 1 left"]);
     let (id, _) = robot.asked_world.expect("a request");
-    let nobody = Err("nobody answers".to_owned());
+    let nobody = Err(Reason::read("nobody answers"));
     robot.conversation.answered_by_world(robot.now, id, &nobody);
     assert_eq!(robot.done(), ["refused 2 nobody answers"]);
 }

@@ -1,7 +1,8 @@
 //! Actions that move the robot.
 
-use lager_ports::Stop;
-use lager_topics::{Finish, Mode, Outcome, Refusal, Role, StopCause};
+use lager_orders::Mode;
+use lager_stop::Stop;
+use lager_topics::{Finish, Outcome, Refusal, Role, StopCause};
 
 use super::{done, ended, extended, in_force, pass};
 

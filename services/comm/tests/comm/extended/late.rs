@@ -2,7 +2,8 @@
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Mode, Order, Phase};
+use lager_orders::Mode;
+use lager_topics::{Finish, Order, Phase};
 
 use super::{ended, extended};
 use crate::robot::Robot;

@@ -4,10 +4,11 @@ mod asked;
 mod driven;
 mod late;
 mod ordered;
-mod told;
+mod reported;
 
+use lager_orders::{Mode, Reason};
 use lager_topics::{
-    Answer, Finish, MapProduct, Mode, OrderQueue, Origin, Outcome, Phase, SteeringReport,
+    BridgeAnswer, Finish, MapProduct, OrderQueue, Origin, Outcome, Phase, SteeringReport,
     WaitingOrder, WarehouseMap,
 };
 
@@ -84,9 +85,9 @@ pub(super) fn queue(waiting: &[u32]) -> OrderQueue {
     queue
 }
 
-pub(super) fn done(outcome: Outcome) -> Result<Answer, String> {
-    Ok(Answer {
+pub(super) fn done(outcome: Outcome) -> Result<BridgeAnswer, Reason> {
+    Ok(BridgeAnswer {
         outcome: outcome.into(),
-        ..Answer::default()
+        ..BridgeAnswer::default()
     })
 }

@@ -1,8 +1,8 @@
 //! Actions about orders, goods and who picks them up.
 
+use lager_orders::{Mode, Pick};
 use lager_topics::{
-    Event, EventKind, Failure, FailureKind, Goal, Mode, NavigatorStatus, Order, OrderQueue, Phase,
-    Pick,
+    Event, EventKind, Failure, FailureKind, Goal, NavigatorStatus, Order, OrderQueue, Phase,
 };
 
 use super::{extended, pass, queue};

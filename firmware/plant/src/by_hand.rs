@@ -1,0 +1,47 @@
+//! What a person can do in the world by hand, and what a process that runs a world reports.
+
+use lager_floor::Edge;
+use serde::{Deserialize, Serialize};
+
+use crate::body::Pose;
+use crate::obstacles::HandsOff;
+use crate::world::{Snapshot, World};
+
+/// Something that a person does.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Hand {
+    /// Lifts the robot and puts it here, at rest.
+    Place(Pose),
+    /// Puts a thing on this edge.
+    Put(Edge),
+    /// Takes the thing on this edge away.
+    Take(Edge),
+}
+
+impl Hand {
+    /// Does it in `world`.
+    ///
+    /// # Errors
+    /// The reason why nothing was put or taken.
+    pub fn act(self, world: &mut World) -> Result<(), HandsOff> {
+        match self {
+            Self::Place(pose) => {
+                world.place(pose);
+                Ok(())
+            }
+            Self::Put(edge) => world.put_obstacle(edge),
+            Self::Take(edge) => world.take_obstacle(edge),
+        }
+    }
+}
+
+/// A report from a process that runs a world to the process that started it; a line of JSON each.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Report {
+    /// The true state of the world.
+    Truth(Snapshot),
+    /// The result of a person's action, one for each line that was read.
+    Hand(Result<(), HandsOff>),
+}

@@ -1,0 +1,27 @@
+//! The effects of the conversation.
+
+use lager_lines::conversation::RobotLine;
+use lager_lines::extension::Report;
+use lager_operator::Act;
+use lager_orders::Reason;
+use lager_topics::{SteeringOrder, WarehouseMap};
+
+/// Something to do, in the order of the decisions.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// Say a line to the peer.
+    Say(RobotLine),
+    /// Tell the peer a state, after all other lines. If the peer has not read the last state of
+    /// this kind yet, this one replaces it.
+    Show(Report),
+    /// Close the connection; the link makes another one.
+    HangUp(Reason),
+    /// Publish the warehouse.
+    Map(Box<WarehouseMap>),
+    /// Do this on the bus for an operator, without waiting for an answer.
+    Do(Act),
+    /// Give or renew a steering order.
+    Steer(SteeringOrder),
+    /// Stop the robot by its stop word.
+    Stop,
+}

@@ -1,0 +1,132 @@
+// What state a robot is in, for who glances at it: one look for each, in the bar, on the map and on `/screen`.
+
+import { named } from "./chosen.js";
+import { called, crossing, failure, reason, sentence } from "./sentences.js";
+import { put, say, span } from "./words.js";
+
+/** The looks, the gravest first, each with its shape in a square of 32. */
+export const SHAPES = {
+  unheard: "M16 3a13 13 0 1 0 0 26a13 13 0 1 0 0-26M8 18l4-4M24 14l-4 4M11 22l2-2M19 12l2-2",
+  stopped: "M10 2h12l8 8v12l-8 8H10l-8-8V10zM9 16h14",
+  board: "M16 3L30 28H2zM16 12v8M16 23v2",
+  lost: "M16 3L30 28H2zM13 14a3 3 0 1 1 3 4v2M16 23v2",
+  needs: "M16 3L30 28H2zM16 12v8M16 23v2",
+  hand: "M4 4h24v24H4zM11 17V11M14 16V9M18 16V9M21 17V12M11 17q0 6 5 6t5-6",
+  waits: "M16 3a13 13 0 1 0 0 26a13 13 0 1 0 0-26M13 11v10M19 11v10",
+  drives: "M16 3a13 13 0 1 0 0 26a13 13 0 1 0 0-26M11 10l12 6-12 6 3-6z",
+  none: "M16 3a13 13 0 1 0 0 26a13 13 0 1 0 0-26",
+};
+/** By the names of the robot: what holds it when it does not hear a board. */
+const HELD_BY = { sensor: "blind", steering: "unheard" };
+/** A page that has asked for a stop did so within this time of it, in ms. */
+const ASKED_MS = 10_000;
+
+/** An age in ms, in words that do not dance. */
+export const age = (ms) => (ms < 60_000 ? `${Math.max(0, Math.floor(ms / 1_000))} s` : span(ms));
+
+/**
+ * The look of a robot's state, its sentence, since when, what there is to add, and what stands at the
+ * robot on the map. What is old is not said as if it were so.
+ */
+export function face(link, robot, now) {
+  if (!link.open && link.me === null && link.tries === 0) return { look: "none", said: sentence("face_connecting") };
+  if (!link.open || (robot && (robot.speaks || !robot.connected) && robot.isStale(now))) {
+    const why = link.open ? sentence("face_unheard", { robot: robot.name }) : lost(link);
+    if (!robot) return { look: "unheard", said: why };
+    const old = [robot.heard, robot.stated].filter(Number.isFinite);
+    const heard = old.length ? age(now - Math.min(...old)) : null;
+    const before = does(robot).join(", ");
+    const last = heard ? say("age", heard) : say("unheard");
+    return {
+      look: "unheard",
+      said: why,
+      since: link.open && heard ? sentence("face_since", { age: heard }) : null,
+      isDeaf: link.open && !robot.connected,
+      more: sentences(link.open && heard ? null : last, before && sentence("face_before", { before })),
+      chip: heard && sentence("face_seen", { age: heard }),
+    };
+  }
+  if (!robot) return { look: "none", said: named() && link.me ? say("not_here", named()) : say("no_robot") };
+  if (!robot.speaks) return { look: "none", said: say("plain") };
+  const { phase, remedy, hold, x_mm: x } = robot.state;
+  const boards = silent(robot);
+  const why = failure({ ...robot.state, failure_node: robot.state.node });
+  // Stop and mode stand beside it.
+  const end = ["none", "resume", "mode"].includes(remedy) ? null : sentence(`remedy_${remedy}`);
+  const unknown = phase && x === undefined && phase !== "waiting_for_map";
+  if (robot.state.stopped === "1") return { look: "stopped", ...stopped(link, robot, [...boards, why, end]), chip: sentence("face_stands") };
+  const look = boards.length || Object.values(HELD_BY).includes(hold) ? "board" : unknown ? "lost" : (why && phase !== "picking") || end || phase === "stuck" ? "needs" : idle(robot);
+  const board = Object.keys(HELD_BY).find((name) => hold === HELD_BY[name]);
+  const chip = { board: boards[0] ?? (board && unheard(board)), lost: say("place_unknown") }[look];
+  const [said, ...rest] = does(robot);
+  return { look, said, more: sentences(...rest, ...boards, why, end), chip };
+}
+
+/** Each with a capital; those that are none left out. */
+const sentences = (...all) => all.filter(Boolean).map((one) => one[0].toUpperCase() + one.slice(1)).join(". ");
+
+const unheard = (board) => say("board_lost", say(`board_${board}`));
+
+function idle({ state: { mode, phase } }) {
+  if (mode === "manual") return "hand";
+  return !phase || phase.startsWith("waiting") || phase === "picking" ? "waits" : "drives";
+}
+
+/** The boards that are not heard, unless the reason why it stands says so. */
+function silent({ state }) {
+  const boards = Object.keys(HELD_BY).filter((board) => state[`${board}_up`] === "0" && state.hold !== HELD_BY[board]);
+  return boards.map(unheard);
+}
+
+/** Why a robot stands, and what it does, in words. */
+function does({ state: { phase, next, product, hold, stopped: isStopped } }) {
+  const act = phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase ?? "";
+  const held = hold && hold !== "none" && sentence(`hold_${hold}`);
+  const isHalted = isStopped === "1";
+  const fetches = product !== undefined && say(isHalted ? "was_to_fetch" : "fetches", product);
+  const said = isHalted ? [say("stopped_short"), fetches] : [[act, fetches].filter(Boolean).join(", ")];
+  const [first, ...rest] = [!isHalted && held, ...said, isHalted && held].filter(Boolean);
+  return [first ?? "", ...rest];
+}
+
+/** A latched stop: since when, by whom or why, and that the wheels stand. */
+function stopped(link, robot, more) {
+  const { left_duty: left, right_duty: right } = robot.state;
+  const since = robot.stoppedSince === null ? null : sentence("face_ago", { age: age(Date.now() - robot.stoppedSince) });
+  const by = stopper(link, robot);
+  const turns = Number(left) || Number(right) ? "turn" : "stand";
+  const proof = left === undefined ? null : sentence(`face_wheels_${turns}`);
+  const [said, ...rest] = does(robot);
+  return { said, since, by: by ? sentence("face_by", { by }) : causeOf(robot), proof, more: sentences(...rest, ...more) };
+}
+
+/** The name of who has ordered a stop; null where nobody has. */
+function stopper(link, { state: { stop_cause: cause, stop_by: by }, events, stoppedSince: since }) {
+  if (cause !== "ordered") return null;
+  if (by !== "comm") return by === "operator" ? say("by_operator") : by ?? null;
+  const asked = events.findLast(({ kind, words, at }) => kind === "asked" && words[1] === "stop" && Math.abs(at - (since ?? at)) < ASKED_MS);
+  return asked ? called(asked.words[0], link.me) : say("by_comm");
+}
+
+export const causeOf = ({ state: { stop_cause: cause } }) => (cause !== "none" && sentence(`stop_cause_${cause}`)) || "";
+
+/** Why there is no connection. */
+const lost = (link) => (link.closed ? reason(link.closed) : say("lost"));
+
+const at = (id) => document.getElementById(id);
+
+/** Shows a state in the page that has these parts. What became of a stop stands in the place of the proof. */
+export function show({ look, said, since, by, proof, more, isDeaf }, robot) {
+  const { body } = document;
+  body.dataset.look = look;
+  body.classList.toggle("stale", look === "unheard" || look === "none");
+  body.classList.toggle("stopped", robot?.state.stopped === "1");
+  at("shape").setAttribute("d", SHAPES[look]);
+  put(at("doing"), said ?? "");
+  put(at("since"), since ?? "");
+  const told = at("stop-said").textContent ? null : proof;
+  put(at("more"), sentences([by, told].filter(Boolean).join("; "), more));
+  const name = robot?.name ?? named() ?? "";
+  put(at("stop-word"), say("stop"));
+  put(at("stop-whom"), isDeaf ? sentence("face_deaf", { robot: name }) : name);
+}

@@ -1,0 +1,264 @@
+//! The files that outlive `lager up` and `lager station`: the warehouse that somebody has saved in
+//! the panel, and the orders that wait.
+//!
+//! ```text
+//!   the warehouse    in the file that was named, else NAME.toml of a built-in one, in
+//!   the orders       and everything else, in
+//!                    the state folder: --state or `state`, else
+//!                      .state in the folder of the bus, if that was named, else
+//!                      $STATE_DIRECTORY, else $XDG_STATE_HOME/lager, else ~/.local/state/lager
+//!                        /ROBOT       of `lager up`
+//!                        /.station    of `lager station`
+//! ```
+//! So two buses share nothing (tests rely on that), and the user's own robot finds its files again.
+//!
+//! A robot runs in a copy of the warehouse's file, made at its start. So a service that starts
+//! again finds the same world, whatever somebody has saved since.
+
+use std::env;
+use std::fs::{self, DirBuilder};
+use std::io::ErrorKind;
+use std::os::unix::fs::DirBuilderExt as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use lager_station::files;
+
+/// In the folder of a bus. No robot can have this name.
+const BESIDE_A_BUS: &str = ".state";
+/// For `lager station`. No robot can have this name.
+const STATION: &str = ".station";
+/// The copy of the warehouse.
+const RUNNING: &str = "running.toml";
+/// The orders of a robot's own queue.
+const ORDERS: &str = "orders.toml";
+/// The queue of the robot's own station.
+const QUEUE: &str = "queue.toml";
+
+/// The folder of everything that is kept: the one that the user named, or one in the folder of the
+/// bus if the user named that, or this user's own.
+///
+/// # Errors
+/// Nothing says where it is.
+pub fn root(named: Option<&Path>, bus: Option<&Path>) -> Result<PathBuf> {
+    if let Some(folder) = named {
+        return Ok(std::path::absolute(folder)?);
+    }
+    if let Some(bus) = bus {
+        return Ok(std::path::absolute(bus)?.join(BESIDE_A_BUS));
+    }
+    let variable = |name| env::var_os(name).filter(|value| !value.is_empty());
+    if let Some(folders) = variable("STATE_DIRECTORY") {
+        // A system service may have several folders; the first one is for this.
+        let folder = env::split_paths(&folders).next();
+        return folder.context("STATE_DIRECTORY names no folder");
+    }
+    let is_whole = |folder: &PathBuf| folder.is_absolute();
+    if let Some(folder) = variable("XDG_STATE_HOME")
+        .map(PathBuf::from)
+        .filter(is_whole)
+    {
+        return Ok(folder.join("lager"));
+    }
+    match variable("HOME").map(PathBuf::from).filter(is_whole) {
+        Some(home) => Ok(home.join(".local/state/lager")),
+        None => bail!(
+            "nothing says where to keep the warehouse and the orders: HOME is not set; --state FOLDER does"
+        ),
+    }
+}
+
+/// The folder of one robot or of `lager station`, below the [`root`].
+#[derive(Clone, Debug)]
+pub struct StateFolder(PathBuf);
+
+impl StateFolder {
+    /// The folder of the robot `name`, which may not exist.
+    #[must_use]
+    pub fn of_robot(root: &Path, name: &str) -> Self {
+        Self(root.join(name))
+    }
+
+    /// The folder of a station that runs by itself.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub fn of_station(root: &Path) -> Result<Self> {
+        let folder = Self(root.join(STATION));
+        folder.make()?;
+        Ok(folder)
+    }
+
+    /// Makes the folder, for this user alone.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub fn make(&self) -> Result<()> {
+        let made = DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(&self.0);
+        made.with_context(|| {
+            format!(
+                "cannot make {}, where warehouse and orders are kept; --state FOLDER takes another",
+                self.0.display()
+            )
+        })
+    }
+
+    /// Where the changes of a built-in warehouse are kept.
+    #[must_use]
+    pub fn warehouse(&self, builtin: &str) -> PathBuf {
+        self.0.join(format!("{builtin}.toml"))
+    }
+
+    /// Where a station keeps a warehouse that somebody else describes.
+    pub fn warehouse_of_nobody(&self) -> PathBuf {
+        self.0.join("warehouse.toml")
+    }
+
+    /// Where a station keeps its queue.
+    pub fn queue(&self) -> PathBuf {
+        self.0.join(QUEUE)
+    }
+
+    /// Where the orders of a robot's own queue are kept.
+    pub fn orders(&self) -> PathBuf {
+        self.0.join(ORDERS)
+    }
+
+    /// The saved file of a built-in warehouse, if there is one that `read` can read, and what to
+    /// tell people.
+    pub fn saved(
+        &self,
+        builtin: &str,
+        read: impl FnOnce(&str) -> Result<()>,
+    ) -> (Option<String>, Option<String>) {
+        let file = self.warehouse(builtin);
+        if !file.exists() {
+            return (None, None);
+        }
+        let path = file.display().to_string();
+        match read(&path) {
+            Ok(()) => {
+                let note = format!(
+                    "the warehouse is the one that was saved in {path}; without that file it is the built-in `{builtin}`"
+                );
+                (Some(path), Some(note))
+            }
+            Err(error) => {
+                let aside = match files::set_aside(&file) {
+                    Ok(aside) => format!("it is now {}", aside.display()),
+                    Err(error) => format!("it stays there: {error}"),
+                };
+                let why = format!(
+                    "the warehouse that was saved cannot be used: {error:#}; {aside}, and the built-in `{builtin}` is used"
+                );
+                (None, Some(why))
+            }
+        }
+    }
+
+    /// Removes what has no meaning any more: the copy of the warehouse, an empty queue, and empty
+    /// folders.
+    pub fn tidy(&self) {
+        let _ = fs::remove_file(self.0.join(RUNNING));
+        for path in [self.queue(), self.orders()] {
+            if fs::metadata(&path).is_ok_and(|file| file.len() == 0) {
+                let _ = fs::remove_file(path);
+            }
+        }
+        // They stay if there is something in them.
+        let _ = fs::remove_dir(&self.0);
+        if let Some(root) = self.0.parent().filter(|root| root.ends_with(BESIDE_A_BUS)) {
+            let _ = fs::remove_dir(root);
+        }
+    }
+}
+
+/// The copy of the warehouse in which a robot runs.
+#[derive(Clone, Debug)]
+pub struct WarehouseCopy {
+    /// Where.
+    pub folder: StateFolder,
+    /// The warehouse, in TOML.
+    pub text: String,
+}
+
+impl WarehouseCopy {
+    /// Writes it, also if somebody has removed the folder. Returns its file.
+    ///
+    /// # Errors
+    /// The disk refuses the file.
+    pub fn write(&self) -> Result<PathBuf> {
+        self.folder.make()?;
+        let path = self.folder.0.join(RUNNING);
+        files::replace(&path, &self.text)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+}
+
+/// Reads a file that is kept. A damaged file is moved out of the way, and the user is told.
+///
+/// # Errors
+/// The file exists and cannot be read.
+pub fn read_kept<T>(path: &Path, notes: &mut Vec<String>) -> Result<T>
+where
+    T: serde::de::DeserializeOwned + Default,
+{
+    match files::read_toml(path) {
+        Ok(kept) => Ok(kept),
+        Err(files::ReadError::Read { error, .. }) if error.kind() == ErrorKind::NotFound => {
+            Ok(T::default())
+        }
+        Err(error) if error.is_damage() => {
+            let aside = files::set_aside(path)
+                .with_context(|| format!("{error}, and it cannot be moved out of the way"))?;
+            notes.push(format!(
+                "what was kept is lost: {error}; it is now {}",
+                aside.display()
+            ));
+            Ok(T::default())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_lies_with_a_bus_that_was_named_unless_somebody_says_otherwise() {
+        let bus = Some(Path::new("/run/hall"));
+        assert_eq!(root(None, bus).unwrap(), Path::new("/run/hall/.state"));
+        let named = Some(Path::new("/srv/hall"));
+        assert_eq!(root(named, bus).unwrap(), Path::new("/srv/hall"));
+    }
+
+    #[test]
+    fn a_saved_warehouse_that_cannot_be_read_is_put_aside_and_told() {
+        let root = std::env::temp_dir().join(format!("lager-saved-{}", std::process::id()));
+        let folder = StateFolder::of_robot(&root, "r1");
+        assert_eq!(folder.saved("small", |_| Ok(())), (None, None));
+        folder.make().unwrap();
+        fs::write(folder.warehouse("small"), "size = ").unwrap();
+        let (file, note) = folder.saved("small", |_| Ok(()));
+        assert!(file.unwrap().ends_with("r1/small.toml"));
+        assert!(note.unwrap().contains("was saved in"));
+        let (file, note) = folder.saved("small", |_| bail!("no number"));
+        assert_eq!(file, None);
+        let note = note.unwrap();
+        assert!(note.contains("no number; it is now"), "{note}");
+        assert!(!folder.warehouse("small").exists());
+        fs::remove_dir_all(root).unwrap();
+    }
+
+    #[test]
+    fn no_robot_has_the_name_of_a_folder_beside_its_own() {
+        for name in [STATION, BESIDE_A_BUS] {
+            assert!(name.parse::<lager_home::UnitName>().is_err(), "{name}");
+        }
+    }
+}
