@@ -52,7 +52,7 @@
 
 use core::ops::Range;
 use core::time::Duration;
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 
 use lager_floor::ProductId;
 use lager_lines::Name;
@@ -63,7 +63,7 @@ use lager_lines::splitter::LineError;
 use lager_operator::{Driving, For, Orders};
 use lager_orders::lease::{COMMAND, LATEST, LATEST_MOVE, TooLate};
 use lager_orders::{Code, Mode, Moment, Reason};
-use lager_topics::{Phase, Role, WarehouseMap};
+use lager_topics::{Event, Phase, Role, WarehouseMap};
 use lager_wire::OperatorCommand;
 
 use crate::effect::Effect;
@@ -101,6 +101,11 @@ const PACE: u64 = 1_000_000;
 /// In ns since the connection began: from when to when a robot in manual mode that nobody has
 /// driven asks for the warehouse, not for commands.
 const DESCRIBED: Range<u64> = 1_000_000_000..2_000_000_000;
+/// How long an event waits at most for the status that follows from it, and how soon the robot looks
+/// for one. Logic publishes an event first, so a peer that hears it at once may answer before comm
+/// knows the state from which the answer must be judged.
+const UNTOLD: u64 = 100_000_000;
+const UNTOLD_PACE: u64 = 1_000_000;
 /// The answer to actions that a stop has ended.
 const STOPPED: Code = Code::Stopped;
 /// How many stops may wait for their confirmation.
@@ -147,6 +152,10 @@ pub struct Conversation {
 
     warehouse: Described,
     known: Known,
+    /// When the last status was published.
+    status_ns: u64,
+    /// Events that wait for the status that follows from them, and when each was published.
+    untold: VecDeque<(u64, Event)>,
     /// What only a peer with the extension is told.
     telling: Telling,
     /// What has happened lately.
@@ -190,6 +199,8 @@ impl Conversation {
                 map: kept.map(Box::new),
                 ..Known::default()
             },
+            status_ns: 0,
+            untold: VecDeque::new(),
             telling: Telling::default(),
             memory: Memory::default(),
             lives: HashMap::new(),
@@ -210,9 +221,10 @@ impl Conversation {
         self.driving.due()
     }
 
-    /// When it must be called next to ask a question, in ns of real time, if a question waits.
-    pub const fn asks_ns(&self) -> Option<u64> {
-        self.asks_ns
+    /// When it must be called next because of a question or an event that waits, in ns of real time.
+    pub fn due_ns(&self) -> Option<u64> {
+        let looks = (!self.untold.is_empty()).then(|| self.turned_ns + UNTOLD_PACE);
+        self.asks_ns.into_iter().chain(looks).min()
     }
 
     /// A connection has begun.
@@ -264,6 +276,7 @@ impl Conversation {
         self.effects.extend(renewed.map(Effect::Steer));
         // In the document's language nothing ends an order that was given.
         self.orders.turn(now, |asker| asker != Asker::Question);
+        self.tell_events(now);
         self.settle();
         let told = self
             .standing

@@ -208,9 +208,9 @@ impl Shell {
     fn longest_wait(&self) -> Duration {
         let due = self.conversation.due();
         let due = due.map(|due| self.clock.real(due.saturating_sub(self.clock.now())));
-        let asks_ns = self.conversation.asks_ns();
-        let asks = asks_ns.map(|at| Duration::from_nanos(at.saturating_sub(Clock::monotonic_ns())));
-        let waits = [due, asks].into_iter().flatten();
+        let due_ns = self.conversation.due_ns();
+        let soon = due_ns.map(|at| Duration::from_nanos(at.saturating_sub(Clock::monotonic_ns())));
+        let waits = [due, soon].into_iter().flatten();
         waits.fold(LONGEST_WAIT, Duration::min)
     }
 
@@ -226,20 +226,23 @@ impl Shell {
             self.conversation.lives(now, Role::Bridge, health.stamp());
             self.conversation.health(now, &health);
         }
+        // Logic publishes queue and route before their status, so what is read after the status is
+        // no older.
+        let status = self.next(|shell| shell.status.latest());
         if let Some(queue) = self.next(|shell| shell.queue.latest()) {
             self.conversation.queue(now, &queue);
         }
-        if let Some(status) = self.next(|shell| shell.status.latest()) {
+        if let Some(route) = self.next(|shell| shell.route.latest()) {
+            self.conversation.route(&route);
+        }
+        if let Some(status) = status {
             let published_ns = status.stamp().publish_time_ns;
             self.conversation.lives(now, Role::Logic, status.stamp());
             self.conversation.status(now, &status, published_ns);
         }
-        // Before the events, because some of them name the next node.
-        if let Some(route) = self.next(|shell| shell.route.latest()) {
-            self.conversation.route(&route);
-        }
         while let Some(event) = self.next(|shell| shell.events.receive()) {
-            self.conversation.event(now, &event);
+            let published_ns = event.stamp().publish_time_ns;
+            self.conversation.event(now, &event, published_ns);
         }
         if let Some(report) = self.next(|shell| shell.reports.latest()) {
             self.conversation.report(now, &report);

@@ -1,10 +1,11 @@
 //! Decides what is published after an input and in which order, and when the order in force and the
 //! status are published again. The shell on the bus, `simulate` and a replay follow it.
 //!
-//! Events go out first, then the blocked ways, the queue and the status, then the order. Last come
-//! the samples on which no service acts. If the process is killed between any two of the first
-//! five, its successor knows at least as much as the bridge: an event may come twice, but is never
-//! lost. Only a setpoint that replaces a setpoint goes out before the status, because it may be
+//! Events go out first, then the blocked ways, the queue, the route and the status, then the order.
+//! Last comes the thought, on which no service acts. If the process is killed between any two of
+//! these, its successor knows at least as much as the bridge: an event may come twice, but is never
+//! lost. A status follows every event at once, so whoever has read a later status knows everything
+//! that follows from the event. Only a setpoint that replaces a setpoint goes out before the status, because it may be
 //! given twice. The successor may not know its number, so it leaves one number out when it resumes
 //! from a status. An unchanged order is renewed every 40 ms of robot time.
 
@@ -30,12 +31,12 @@ pub enum Part {
     Blocks,
     /// The orders that wait.
     Queue,
+    /// The route.
+    Route,
     /// The status.
     Status,
     /// The order in force.
     Order,
-    /// The route.
-    Route,
     /// The thought of the answer.
     Thought,
 }
@@ -45,9 +46,9 @@ const PARTS: [Part; 7] = [
     Part::Events,
     Part::Blocks,
     Part::Queue,
+    Part::Route,
     Part::Status,
     Part::Order,
-    Part::Route,
     Part::Thought,
 ];
 
@@ -57,8 +58,8 @@ const SETPOINT_FIRST: [Part; 7] = [
     Part::Order,
     Part::Blocks,
     Part::Queue,
-    Part::Status,
     Part::Route,
+    Part::Status,
     Part::Thought,
 ];
 
@@ -93,16 +94,17 @@ impl Outgoing {
         if is_new {
             self.renewal_due = now + RENEWAL;
         }
-        if output.status_changed {
+        let status_goes = output.status_changed || !output.events.is_empty();
+        if status_goes {
             self.status_due = now + STATUS_PERIOD;
         }
         let goes = [
             !output.events.is_empty(),
             output.blocks_changed,
             output.queue_changed,
-            output.status_changed,
-            is_new && order.is_some(),
             output.route_changed,
+            status_goes,
+            is_new && order.is_some(),
             output.thought.is_some(),
         ];
         parts
@@ -238,6 +240,11 @@ mod tests {
         assert_eq!(outgoing.after(MS * 90, None, &changed).count(), 1);
         assert_eq!(again(&mut outgoing, 139, 0), []);
         assert_eq!(again(&mut outgoing, 140, 0), [Part::Status]);
+        let mut happened = Output::default();
+        happened.events.push(Default::default()).expect("a place");
+        let said: Vec<Part> = outgoing.after(MS * 150, ahead, &happened).collect();
+        assert_eq!(said, [Part::Events, Part::Status, Part::Order]);
+        assert_eq!(again(&mut outgoing, 189, 0), []);
     }
 
     #[test]

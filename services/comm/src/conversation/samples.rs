@@ -37,12 +37,14 @@ impl Conversation {
     /// Logic says where it is and what it does, in a sample that was published at this moment.
     pub fn status(&mut self, now: Moment, status: &NavigatorStatus, published_ns: u64) {
         self.known.status = Some(*status);
+        self.status_ns = published_ns;
         self.orders.status(status, published_ns);
         self.settle();
         if let Some(heading) = status.heading.get() {
             let line = self.told.looks(heading);
             self.say_if_up(line);
         }
+        self.tell_events(now);
         self.ask(now);
     }
 
@@ -54,8 +56,25 @@ impl Conversation {
         self.ask(now);
     }
 
-    /// Something has happened on a mission.
-    pub fn event(&mut self, now: Moment, event: &Event) {
+    /// Something has happened on a mission; the event was published at this moment. The station
+    /// hears it when a later status is known, with the queue and the route of that status.
+    pub fn event(&mut self, now: Moment, event: &Event, published_ns: u64) {
+        self.untold.push_back((published_ns, *event));
+        self.tell_events(now);
+    }
+
+    /// Tells the events whose status is known, and those that have waited for it in vain.
+    pub(super) fn tell_events(&mut self, now: Moment) {
+        while let Some((published_ns, event)) = self.untold.front().copied() {
+            if self.status_ns < published_ns && now.ns < published_ns + UNTOLD {
+                return;
+            }
+            self.untold.pop_front();
+            self.tell_event(now, &event);
+        }
+    }
+
+    fn tell_event(&mut self, now: Moment, event: &Event) {
         let waited = (self.is_ordering(), self.orders.has_picked());
         self.orders.event(event);
         // A person who answered a question gets the reason from logic, in a thought.

@@ -11,7 +11,7 @@ use lager_lines::{Name, to_line};
 use lager_operator::Act;
 use lager_orders::{Mode, Moment, Reason};
 use lager_topics::{
-    Ask, Health, Input, InputKind, NavigatorStatus, Order, OrderQueue, Origin, Phase,
+    Ask, Event, Health, Input, InputKind, NavigatorStatus, Order, OrderQueue, Origin, Phase,
     SteeringReport, WarehouseMap, WorldAsk,
 };
 
@@ -20,6 +20,8 @@ pub(crate) struct Robot {
     pub(crate) conversation: Conversation,
     pub(crate) now: Moment,
     pub(crate) health: Health,
+    /// When logic's last status was published.
+    pub(crate) status_ns: u64,
     pub(crate) map: Option<Box<WarehouseMap>>,
     pub(crate) ordered: Option<Order>,
     /// The last steering order that was given or renewed: its id and code.
@@ -63,6 +65,7 @@ impl Robot {
                 ns: 1_000_000_000,
             },
             health: Health::default(),
+            status_ns: 0,
             map: None,
             ordered: None,
             steered: None,
@@ -230,7 +233,7 @@ impl Robot {
                 return asked;
             }
             // As its shell: when it wants to be looked after, and every 10 ms.
-            let due = self.conversation.asks_ns().unwrap_or(u64::MAX);
+            let due = self.conversation.due_ns().unwrap_or(u64::MAX);
             let wait = due.saturating_sub(self.now.ns).clamp(1_000, 10_000_000);
             self.leap_us(wait.div_ceil(1_000));
             said = self.done();
@@ -293,7 +296,8 @@ impl Robot {
 
     /// Logic tells its status, published at this moment.
     pub(crate) fn status(&mut self, status: &NavigatorStatus) {
-        self.conversation.status(self.now, status, self.now.ns);
+        self.status_ns = self.now.ns;
+        self.conversation.status(self.now, status, self.status_ns);
     }
 
     /// Logic tells its queue.
@@ -302,8 +306,15 @@ impl Robot {
         self.done()
     }
 
-    pub(crate) fn event(&mut self, event: &lager_topics::Event) -> Vec<String> {
-        self.conversation.event(self.now, event);
+    /// Something happens, and logic's last status follows from it.
+    pub(crate) fn event(&mut self, event: &Event) -> Vec<String> {
+        self.conversation.event(self.now, event, self.status_ns);
+        self.done()
+    }
+
+    /// Something happens now, and no status has followed from it yet.
+    pub(crate) fn event_before_its_status(&mut self, event: &Event) -> Vec<String> {
+        self.conversation.event(self.now, event, self.now.ns);
         self.done()
     }
 }

@@ -134,6 +134,35 @@ fn the_goods_are_in_the_gripper_when_logic_leaves() {
 }
 
 #[test]
+fn an_answer_to_an_event_is_judged_by_the_state_that_follows_from_it() {
+    let mut robot = extended(Mode::Autonomous);
+    let order = Some(Order { id: 4, product: 7 });
+    robot.does(Phase::Driving, order);
+    robot.pass(10);
+    let event = Event {
+        kind: EventKind::InPosition.into(),
+        order_id: 4,
+        product: 7,
+        ..Event::default()
+    };
+    // A station that heard this would give `picked` at once, and be refused.
+    assert_eq!(robot.event_before_its_status(&event), [""; 0]);
+    let soon = robot.conversation.due_ns().expect("it looks again soon");
+    assert!(soon <= robot.now.ns + 1_000_000);
+    assert_eq!(robot.pass(1), [""; 0]);
+    let said = robot.does(Phase::Picking, order);
+    assert!(said[0].starts_with("event in_position "), "{said:?}");
+    assert_eq!(robot.hears(&["do 1 picked"])[0], "[picked]");
+
+    // Whoever publishes no status after it does not keep it from people.
+    robot.pass(10);
+    assert_eq!(robot.event_before_its_status(&event), [""; 0]);
+    assert_eq!(robot.pass(90), [""; 0]);
+    let said = robot.pass(10);
+    assert!(said[0].starts_with("event in_position "), "{said:?}");
+}
+
+#[test]
 fn who_picks_is_chosen_when_logic_says_so() {
     let mut robot = extended(Mode::Autonomous);
     // Logic shows who picks, and some time passes.
