@@ -1,5 +1,7 @@
 //! The last samples of the robot's other services.
 
+use core::time::Duration;
+
 use lager_operator::Seen;
 use lager_orders::Mode;
 use lager_stop::Stop;
@@ -16,12 +18,25 @@ pub(crate) struct Known {
     pub(crate) status: Option<NavigatorStatus>,
     pub(crate) queue: Option<OrderQueue>,
     pub(crate) report: Option<SteeringReport>,
+    pub(crate) stood: Stood,
     pub(crate) route: Option<Box<Route>>,
     pub(crate) senses: Senses,
     /// Somebody has told where the robot really is, so there is a simulated world to ask.
     pub(crate) is_simulated: bool,
     /// The warehouse that this process or an earlier one has published.
     pub(crate) map: Option<Box<WarehouseMap>>,
+}
+
+/// When both wheels stood after the stop in force.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) enum Stood {
+    /// Nobody has seen it: there is no stop, or it was set before comm started.
+    #[default]
+    Unseen,
+    /// The stop was set, and the wheels still turn.
+    Awaited,
+    /// They stood so long after it.
+    After(Duration),
 }
 
 /// New samples that only a station with the extension is told.

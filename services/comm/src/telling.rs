@@ -18,7 +18,7 @@ use lager_topics::{
 };
 use lager_wire::{Binary, LineBits, LineReading};
 
-use crate::known::{Known, Senses};
+use crate::known::{Known, Senses, Stood};
 use crate::pose;
 
 /// How often the state is told, in ns of real time.
@@ -234,6 +234,9 @@ fn put_stop(state: &mut State, now: Moment, known: &Known) {
     state.stop_by = word(health.stop_origin);
     let at = Some(health.stopped_at_ns).filter(|at| *at != 0);
     state.stop_age_ms = at.map(|at| now.ns.saturating_sub(at) / 1_000_000);
+    if let Stood::After(time) = known.stood {
+        state.stood_ms = u64::try_from(time.as_millis()).ok();
+    }
 }
 
 fn put_place(state: &mut State, known: &Known) {

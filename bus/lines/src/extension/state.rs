@@ -56,6 +56,8 @@ fields! {
         stop: u64 = "the number of a stop",
         /// How long ago that was, in ms.
         stop_age_ms: u64 = "a time in ms",
+        /// How long after that both motors had no duty, in ms; left out where nobody has seen it.
+        stood_ms: u64 = "a time in ms",
         /// The order it is on.
         order: u32 = "an order from 0 to 4294967295",
         /// The product it fetches.

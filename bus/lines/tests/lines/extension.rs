@@ -135,6 +135,7 @@ fn the_fullest_state_fits_in_a_line() {
         stop_by: name(),
         stop: Some(u64::MAX),
         stop_age_ms: Some(u64::MAX),
+        stood_ms: Some(u64::MAX),
         failure: name(),
         failure_expected: Some(i32::MIN),
         failure_seen: Some(i32::MIN),

@@ -180,12 +180,12 @@ prop_compose! {
 prop_compose! {
     fn trouble()(
         work in work(), stop_cause in of(name()), stop_by in of(name()),
-        stop_age_ms in of(any::<u64>()), failure in of(name()),
+        stop_age_ms in of(any::<u64>()), stood_ms in of(any::<u64>()), failure in of(name()),
         failure_expected in of(any::<i32>()), failure_seen in of(any::<i32>()),
         remedy in of(name()),
     ) -> State {
         State {
-            stop_cause, stop_by, stop_age_ms, failure, failure_expected, failure_seen, remedy,
+            stop_cause, stop_by, stop_age_ms, stood_ms, failure, failure_expected, failure_seen, remedy,
             ..work
         }
     }

@@ -1,5 +1,7 @@
 //! Takes the samples of the robot's other services.
 
+use core::time::Duration;
+
 use lager_floor::Node;
 use lager_lines::conversation::RobotLine;
 use lager_lines::extension::{EventKind, Report};
@@ -11,7 +13,7 @@ use lager_topics::{
 };
 
 use super::{AGAIN, Asker, Conversation, STOPPED};
-use crate::known::Senses;
+use crate::known::{Senses, Stood};
 use crate::{speech, telling};
 
 impl Conversation {
@@ -99,6 +101,10 @@ impl Conversation {
         // Use the board's report, which has just come.
         let stands = (report.left_duty, report.right_duty, report.age_ms) == (0, 0, 0);
         if self.known.is_stopped() && stands && self.known.board_tells_duties() {
+            if let (Stood::Awaited, Some(health)) = (self.known.stood, &self.known.health) {
+                let after = Duration::from_nanos(now.ns.saturating_sub(health.stopped_at_ns));
+                self.known.stood = Stood::After(after);
+            }
             for (number, since) in core::mem::take(&mut self.stops) {
                 let after_ms = now.ns.saturating_sub(since) / 1_000_000;
                 self.say(RobotLine::Report(Report::Stopped {
@@ -168,8 +174,10 @@ impl Conversation {
         let Some(before) = before else { return };
         let is_another = before.stopped_at_ns != health.stopped_at_ns;
         if health.stopped != 0 && (before.stopped == 0 || is_another) {
+            self.known.stood = Stood::Awaited;
             self.happened(now, EventKind::Stopped, &telling::stop_words(health));
         } else if before.stopped != 0 && health.stopped == 0 {
+            self.known.stood = Stood::Unseen;
             self.happened(now, EventKind::Resumed, "");
         }
         if let Some(mode) = health.mode.get().filter(|_| before.mode != health.mode) {

@@ -1,7 +1,8 @@
 //! What such a station is told of the robot, and no other peer is.
 
-use lager_comm::Senses;
+use lager_comm::{Conversation, LinkLost, Senses};
 use lager_floor::Heading;
+use lager_lines::Name;
 use lager_lines::extension::Latency;
 use lager_orders::Mode;
 use lager_sample::Stamp;
@@ -263,6 +264,55 @@ fn a_stop_and_a_failure_are_told_with_what_is_known_of_them() {
     ] {
         assert!(state.contains(field), "{field}: {state}");
     }
+}
+
+#[test]
+fn how_soon_both_wheels_stood_is_told_where_it_was_seen() {
+    let stood = |robot: &mut Robot| -> Option<String> {
+        robot.shown.clear();
+        pass(robot, 100);
+        let state = robot.shown.iter().find(|line| line.starts_with("state "));
+        let mut words = state.expect("one in 50 ms").split(' ');
+        words.find_map(|word| word.strip_prefix("stood_ms=").map(str::to_owned))
+    };
+    let report = |left_duty| SteeringReport {
+        left_duty,
+        ..SteeringReport::default()
+    };
+    let stop = |robot: &mut Robot| {
+        robot.health.stopped = 1;
+        robot.health.stopped_at_ns = robot.now.ns;
+        robot.told();
+    };
+    let mut robot = extended(Mode::Autonomous);
+    robot.health.steering.version = 1;
+    robot.told();
+    robot.reports(&report(120));
+    stop(&mut robot);
+    robot.leap(7);
+    robot.reports(&report(60));
+    assert_eq!(stood(&mut robot), None, "they turn");
+    robot.leap(3);
+    robot.reports(&report(0));
+    let after = (robot.now.ns - robot.health.stopped_at_ns) / 1_000_000;
+    assert_eq!(stood(&mut robot), Some(after.to_string()));
+    robot.reports(&report(0));
+    assert_eq!(stood(&mut robot), Some(after.to_string()), "the first time");
+    robot.health.stopped = 0;
+    robot.told();
+    assert_eq!(stood(&mut robot), None);
+    stop(&mut robot);
+    robot.reports(&report(0));
+    assert_eq!(stood(&mut robot), Some("0".to_owned()), "of the newer stop");
+
+    // Who comes later does not know when they stood.
+    let name = Name::new("r1").expect("a name");
+    robot.conversation = Conversation::new(name, None, LinkLost::GoOn);
+    robot.told();
+    robot.connect();
+    robot.hears(&["lager 1 station"]);
+    robot.reports(&report(0));
+    assert_eq!(stood(&mut robot), None);
 }
 
 #[test]
