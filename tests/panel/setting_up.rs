@@ -171,18 +171,25 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
             line + 2
         )
     };
-    page.click(&button(1, 1));
-    page.wait_until(&format!("{waiting} === '3,2'"));
-    page.click(&button(0, 2));
-    page.wait_until(&format!("{waiting} === '2,3'"));
-    page.click(&button(0, 3));
-    page.wait_until(&format!("{waiting} === '3'"));
-    page.click("#queue-undo");
-    page.wait_until(&format!("{waiting} === '2,3'"));
-    page.click("#clear");
-    page.wait_until(&format!("{waiting} === ''"));
-    page.click("#queue-undo");
-    page.wait_until(&format!("{waiting} === '2,3'"));
+    // What was held up is refused with a reason, and then a person clicks again.
+    let click = |page: &mut Page, selector: &str, queue: &str| {
+        let mut said = page.text("#missions-said");
+        page.click(selector);
+        wait_for(&format!("the queue to be {queue:?}"), || {
+            let says = page.text("#missions-said");
+            if says != said && !says.is_empty() {
+                page.click(selector);
+            }
+            said = says;
+            (page.value(waiting) == queue).then_some(())
+        });
+    };
+    click(page, &button(1, 1), "3,2");
+    click(page, &button(0, 2), "2,3");
+    click(page, &button(0, 3), "3");
+    click(page, "#queue-undo", "2,3");
+    click(page, "#clear", "");
+    click(page, "#queue-undo", "2,3");
     assert_eq!(
         page.value("document.querySelector('#queue-undo').hidden"),
         true

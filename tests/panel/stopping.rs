@@ -155,7 +155,7 @@ pub(crate) fn what_happens_to_the_robot_is_in_the_log_and_survives_the_station(
 
 /// How a state looks: the page's style, the colour behind its sentence, and the text at the robot.
 const LOOK: &str = "(() => { const at = (part) => document.querySelector(part); \
-    return [document.body.dataset.look, getComputedStyle(at('#state')).backgroundColor, \
+    return [document.body.dataset.look, getComputedStyle(at('#state') ?? document.body).backgroundColor, \
       at('#map .chip:not([hidden]) text')?.textContent ?? '-'].join('; '); })()";
 
 #[test]

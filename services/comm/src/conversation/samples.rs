@@ -12,7 +12,7 @@ use lager_topics::{
     WorldAnswer,
 };
 
-use super::{AGAIN, Asker, Conversation, STOPPED};
+use super::{AGAIN, Asker, Conversation, STOPPED, UNTOLD};
 use crate::known::{Senses, Stood};
 use crate::{speech, telling};
 
