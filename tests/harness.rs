@@ -275,12 +275,14 @@ impl Domain {
     }
 }
 
-/// Whether this file may stay: orders, a warehouse, or the lock of a killed station.
+/// Whether this file may stay: orders, a warehouse, a history, or the lock of a killed station.
 fn is_kept(path: &Path) -> bool {
     let is_state = path.components().any(|part| part.as_os_str() == ".state");
-    let is_file = path
-        .extension()
-        .is_some_and(|end| end == "toml" || end == "queue" || end == "lock");
+    let is_file = path.extension().is_some_and(|end| {
+        ["toml", "queue", "log", "lock"]
+            .iter()
+            .any(|kept| end == *kept)
+    });
     is_state && is_file && !path.ends_with("running.toml")
 }
 

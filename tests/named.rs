@@ -62,7 +62,7 @@ fn goods_are_ordered_by_name_with_a_station_and_without_one() {
         domain.done(&["queue", "add", "wood glue"]);
         domain.done(&["fetch", "3"]);
         let twice = said(&domain.run(&["fetch", "screws"]));
-        assert!(twice.contains("product 1 is ordered already"), "{twice}");
+        assert!(twice.contains("goods 1 are ordered already"), "{twice}");
         let listed = said(&domain.run(&["queue"]));
         let products = listed.lines().filter_map(|line| line.split_once(": "));
         let products: Vec<_> = products.map(|(_, product)| product).collect();

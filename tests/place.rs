@@ -194,7 +194,7 @@ fn another_user_is_told_whose_the_robot_is() {
         // Root starts it as another user; any other user tries files of root.
         let mut other = Command::new(lager());
         other.args(["--bus", "/proc/1/task", "topic", "list"]);
-        assert!(said(&to_its_end(other)).contains("sudo -u root lager"));
+        assert!(said(&to_its_end(other)).contains("`sudo -u root`"));
         return;
     }
     // A copy of the program in a folder that every user may enter.
@@ -209,7 +209,9 @@ fn another_user_is_told_whose_the_robot_is() {
     fs::remove_file(&program).expect("the copy");
     assert_eq!(refused.status.code(), Some(1));
     assert!(
-        said(&refused).contains("belongs to UID 0 (root); use `sudo -u root lager"),
+        said(&refused)
+            .contains("belongs to UID 0 (root); use the bus as that user (`sudo -u root`)")
+            && said(&refused).contains("`--bus` names another folder"),
         "{}",
         said(&refused)
     );

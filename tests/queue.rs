@@ -116,7 +116,7 @@ fn goods_that_cannot_be_reached_end_the_mission_with_what_logic_calls_it() {
     assert_eq!(told["delivered"], serde_json::json!([]), "{told}");
     assert_eq!(told["failure_kind"], "Unreachable", "{told}");
     let why = told["failure"].as_str().expect("a sentence");
-    assert!(why.contains("I cannot get from"), "{why}");
+    assert!(why.contains("the robot cannot get from"), "{why}");
     domain.assert_clean();
 }
 
@@ -180,7 +180,7 @@ fn what_waits_outlives_up_and_a_script_leaves_it_alone() {
         up.output()
     );
     let twice = said(&domain.run(&["queue", "add", "3"]));
-    assert!(twice.contains("product 3 is ordered already"), "{twice}");
+    assert!(twice.contains("goods 3 are ordered already"), "{twice}");
     domain.done(&["resume"]);
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(0), "{}", up.log());
@@ -230,7 +230,7 @@ fn delivered_goods_are_shown_as_gone_and_not_fetched_again() {
     let again = domain.run(&["fetch", "1"]);
     assert!(!again.status.success());
     let why = said(&again);
-    assert!(why.contains("product 1 was delivered "), "{why}");
+    assert!(why.contains("goods 1 were delivered "), "{why}");
     assert!(
         why.contains("put it back") && why.contains("`lager map back`"),
         "{why}"
@@ -261,7 +261,7 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
     for product in ["1", "3"] {
         let twice = said(&domain.run(&["queue", "add", product]));
         assert!(
-            twice.contains(&format!("product {product} is ordered already")),
+            twice.contains(&format!("goods {product} are ordered already")),
             "{twice}"
         );
     }

@@ -533,3 +533,46 @@ fn a_second_ctrl_c_ends_what_does_not_stop() {
     }
     drop((health, observer));
 }
+
+#[test]
+fn up_says_how_it_ends_and_each_thing_once_and_counts_what_anybody_orders() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless", "--speed", "5"]);
+    let says = |words: &str| {
+        wait_for(words, || up.output().contains(words).then_some(()));
+    };
+    says("fetches product 1");
+    let run = |words: &[&str]| {
+        let told = domain.run(words);
+        assert!(told.status.success(), "{words:?}: {told:?}");
+    };
+    run(&["fetch", "2"]);
+    run(&["stop"]);
+    says("STOPPED");
+    run(&["resume"]);
+    says("the stop is released");
+    says("DELIVERED product 1");
+    says("DELIVERED product 2");
+    interrupt(&mut up, 0);
+    let told = up.output() + &up.log();
+    let first = up.output().lines().next().map(str::to_owned);
+    let first = first.unwrap_or_default();
+    for words in ["Ctrl-C ends", "`lager top`", "`lager fetch 2`"] {
+        assert!(first.contains(words), "{first}");
+    }
+    let lines = |words: &str| {
+        let lines = told.lines().filter(|line| line.contains(words));
+        lines.collect::<Vec<_>>()
+    };
+    let stops = told.lines().filter(|line| {
+        let line = line.to_lowercase();
+        line.contains("stopped")
+    });
+    assert_eq!(stops.count(), 1, "{told}");
+    // The robot's lines say these, so its thoughts do not.
+    for thought in ["I fetch goods", "are delivered", "I turn ", "take them to"] {
+        assert!(lines(thought).is_empty(), "{thought}: {told}");
+    }
+    assert!(!lines("to go.").is_empty(), "{told}");
+    assert_eq!(lines("2 delivered in").len(), 1, "{told}");
+}

@@ -244,6 +244,7 @@ fn what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back() {
         gag: None,
         otherwise: None,
         queues: None,
+        history: None,
         warehouse: None,
         fetch: Vec::new(),
     });
@@ -308,6 +309,7 @@ fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places() {
         warehouse: None,
         otherwise: None,
         queues: None,
+        history: None,
         fetch: Vec::new(),
     });
     let server = server.expect("a station");

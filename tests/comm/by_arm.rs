@@ -12,14 +12,11 @@ use std::time::Duration;
 use lager_ports::Subscriber;
 use lager_tests::{Domain, wait_for};
 use lager_topics::{GoodState, SERVO_UNKNOWN, SteeringState, TruthPose};
+use lager_wire::servo::{BASE, ELBOW, SHOULDER};
 
 use crate::WAREHOUSE;
 use crate::scene::{Peer, WATCHDOG};
 
-/// The indices of the servos in a report.
-const BASE: usize = 0;
-const SHOULDER: usize = 1;
-const ELBOW: usize = 3;
 /// How near a joint can come: a step is three units of a servo's position.
 const NEAR: i32 = 2;
 /// The arm's positions with the claw around goods in their place, and for carrying them.

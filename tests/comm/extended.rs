@@ -204,6 +204,7 @@ impl Served {
             warehouse: None,
             otherwise: None,
             queues: None,
+            history: None,
             fetch: Vec::new(),
         });
         let server = server.expect("a station");

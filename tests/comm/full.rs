@@ -1,8 +1,8 @@
 //! Tests a station whose disk is full: it still answers, says that nothing is saved, keeps the file
-//! as it was, and saves when there is room again.
+//! as it was, and saves when there is room again. Its history does the same.
 
 use std::fs;
-use std::io::BufReader;
+use std::io::{BufReader, Write as _};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -55,7 +55,7 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
     });
     // GaG first: without one the station would answer the robot from its file.
     let gag = UnixStream::connect(here.join("gag")).expect("it listens");
-    let robot = TcpStream::connect(address).expect("it listens");
+    let robot = TcpStream::connect(&address).expect("it listens");
     robot.set_read_timeout(Some(WATCHDOG)).expect("a socket");
     gag.set_read_timeout(Some(WATCHDOG)).expect("a socket");
     let (mut robot, mut gag) = (Peer(BufReader::new(robot)), Peer(BufReader::new(gag)));
@@ -84,6 +84,14 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
     let disk = Path::new(&disk);
     let saved = || fs::read_to_string(disk.join("warehouse.toml")).expect("a file");
     assert_eq!(saved(), WAREHOUSE);
+    // The same disk takes no history, which harms nothing and is said once.
+    let mut other = TcpStream::connect(&address).expect("it listens");
+    other.write_all(b"lager 1 r2\n").expect("it hears");
+    let no_history = || said("err").matches("no history is kept in").count();
+    wait_for("it to say that no history is kept", || {
+        other.write_all(b"thought hej\n").expect("it hears");
+        (no_history() > 0).then_some(())
+    });
 
     fs::remove_file(disk.join("in-the-way")).expect("a file");
     wait_for("the warehouse to be saved", || {
@@ -93,6 +101,24 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
     wait_for("the next one to be saved", || {
         saved().contains("side_length_cm = 46").then_some(())
     });
-    let left: Vec<_> = fs::read_dir(disk).expect("a folder").flatten().collect();
-    assert!(left.len() <= 2, "{left:?}");
+    // The station tries again by itself.
+    let kept = || {
+        other.write_all(b"thought it goes on\n").expect("it hears");
+        let parts = fs::read_dir(disk.join("warehouse.toml.history")).ok()?;
+        let mut texts = parts
+            .flatten()
+            .filter_map(|part| fs::read_to_string(part.path()).ok());
+        texts
+            .find(|text| text.contains("thought it goes on\n"))
+            .map(drop)
+    };
+    wait_for("the history to go on", kept);
+    assert_eq!(no_history(), 1, "{}", said("err"));
+    let left = fs::read_dir(disk).expect("a folder").flatten();
+    let left: Vec<_> = left.map(|entry| entry.file_name()).collect();
+    let history = |name: &std::ffi::OsString| name.to_string_lossy().contains(".history");
+    assert!(
+        left.iter().filter(|name| !history(name)).count() <= 2,
+        "{left:?}"
+    );
 }

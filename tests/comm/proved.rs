@@ -103,6 +103,7 @@ fn a_robot_and_a_station_with_one_secret_find_each_other_and_with_two_they_say_w
         gag: None,
         otherwise: None,
         queues: None,
+        history: None,
         warehouse: None,
         fetch: Vec::new(),
     });

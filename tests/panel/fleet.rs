@@ -31,7 +31,7 @@ fn robots_stand_on_one_map_and_whoever_needs_a_person_comes_first() {
     page.wait_for("#fleet-list", "steering board");
     page.wait_for("#fleet-list", "11.4 V");
     // The other one is on the map with its name, and a click shows it.
-    let others = "[...document.querySelectorAll('#map .other:not([hidden]) text')].map((name) => name.textContent).join()";
+    let others = "[...document.querySelectorAll('#map .label.name-of:not([hidden]) text')].map((name) => name.textContent).join()";
     page.wait_until(&format!("{others} === 'r2'"));
     page.click("#fleet-list li:first-child button");
     page.wait_until("document.querySelector('#stop-whom').textContent === 'r2'");

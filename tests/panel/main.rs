@@ -5,6 +5,8 @@ mod browser;
 mod driving;
 mod fleet;
 mod manners;
+mod map;
+mod needs;
 mod pictures;
 mod played;
 mod reasons;

@@ -175,6 +175,31 @@ fn of_what_is_rare() {
     drop((page, drives));
     stage.end();
 
+    let middle = "size = [5, 4]\nside_length_cm = 50\ndelivery = [0, 0]\n\
+        [[product]]\nid = 1\nname = \"matches\"\nsquare = [1, 1]\nside = \"left\"\n\
+        [[product]]\nid = 2\nname = \"nails\"\nsquare = [3, 2]\nside = \"up\"\n\
+        [[product]]\nid = 3\nname = \"bolts\"\nsquare = [2, 0]\nside = \"down\"\n";
+    let stage = Stage::new(Some(middle));
+    let carries = state(&DRIVES.replace("x_mm=500 y_mm=760", "x_mm=1500 y_mm=760"));
+    let carries = carries.replace("next=1,2", "next=3,2");
+    let lists = [
+        carries.as_str(),
+        "truth 1512 756 2 2",
+        "route 3 3 2 2 2 2 1",
+        "blocked 1 2 1 right 40",
+        "obstacles 2 2 1 right 4 2 up",
+        "queue 1 5 1",
+        "gone 2 2 3",
+    ];
+    let robot = stage.robot("r1", &lists);
+    let mut page = stage.page(&stage.url);
+    page.wait_for("#link", " ms");
+    view(&mut page, "carries");
+    page.click("#map-legend summary");
+    view(&mut page, "legend");
+    drop((page, robot));
+    stage.end();
+
     let mut large = "size = [20, 20]\nside_length_cm = 50\ndelivery = [20, 0]\n".to_owned();
     for id in 1..=24 {
         let (x, y) = (id * 7 % 20, id * 11 % 20);

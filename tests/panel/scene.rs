@@ -168,12 +168,14 @@ impl Scene {
         frozen
     }
 
-    /// Tests that the page saves its history as a table and as a recording that others can read.
+    /// Tests that the page saves the station's history as a table and as a recording that others can
+    /// read.
     pub(crate) fn saves(&self, page: &mut Page) {
         let folder = self.domain.folder();
         page.wait_for("#link", " ms");
         page.save_into(folder);
         page.click("#tab-log");
+        assert_eq!(page.text("#save-span option"), "10 min");
         page.click("#save-csv");
         let table = wait_for("the table", || {
             let text = std::fs::read_to_string(folder.join("r1.csv")).ok()?;
@@ -181,11 +183,18 @@ impl Scene {
             text.ends_with('\n').then_some(text)
         });
         // Each column with a unit names it.
-        let units = "time,x_mm,y_mm,line_error_half_sensors,left_duty_of_255,right_duty_of_255,";
+        let units =
+            "unix_time_s,x_mm,y_mm,line_error_half_sensors,left_duty_of_255,right_duty_of_255,";
         assert!(table.starts_with(units), "{table}");
-        // A page saves only what it has seen, and says how long that was.
-        page.wait_until("/^Save CSV \\d/.test(document.querySelector('#save-csv').textContent)");
         let (head, lines) = table.split_once('\n').expect("lines");
+        // The station knows what happened before this page was there.
+        let began = page.value("performance.timeOrigin / 1000");
+        let first = lines.split(',').next().expect("a cell");
+        let first: f64 = first.parse().expect("a time in s");
+        assert!(
+            first < began.as_f64().expect("a time in s"),
+            "{first}, {began}"
+        );
         for key in [
             "heading_deg",
             "mode",

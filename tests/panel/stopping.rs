@@ -133,9 +133,11 @@ pub(crate) fn what_happens_to_the_robot_is_in_the_log_and_survives_the_station(
     let station = pid(scene.up.service("station").expect("it runs"));
     kill_process(station, Signal::KILL).expect("it runs");
     page.wait_for("#entries", "does not reach the station");
-    // The robot repeats earlier reports to a new station, each once and with its time.
+    // The station has kept all of it, and who asked for what. The robot repeats its reports to a new
+    // station, which tells each once.
     for sentence in [
         "STOPPED: it was ordered",
+        " stops it",
         "the stop is released",
         "its service logic",
     ] {
@@ -147,10 +149,17 @@ pub(crate) fn what_happens_to_the_robot_is_in_the_log_and_survives_the_station(
                 all.filter(|line| line.as_str().is_some_and(|line| line.contains(sentence)))
                     .count()
             };
-            // It keeps the newest reports, and repeats none.
-            (1..=count(&before)).contains(&count(&now)).then_some(())
+            (count(&now) == count(&before)).then_some(())
         });
     }
+    // Another page shows the same.
+    let mut other = scene.page();
+    other.click("#tab-log");
+    for sentence in ["STOPPED: it was ordered", " stops it", "its service logic"] {
+        other.wait_for("#entries", sentence);
+    }
+    scene.saves(&mut other);
+    other.close();
 }
 
 /// How a state looks: the page's style, the colour behind its sentence, and the text at the robot.

@@ -154,6 +154,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-lines",
             "lager-orders",
             "lager-station",
+            "lager-topics",
         ],
     ),
     (

@@ -18,12 +18,12 @@ pub enum HomeError {
     },
     /// The path is a file or a symbolic link.
     #[error(
-        "{0} is a file or a symbolic link and cannot be the bus's folder; remove it, or name a folder with --bus"
+        "{0} is a file or a symbolic link and cannot be the bus's folder; remove it, or use another folder"
     )]
     NoFolder(PathBuf),
     /// The folder belongs to another user.
     #[error(
-        "{folder} belongs to UID {uid} ({name}); use `sudo -u {name} lager ...`, or name another folder with --bus"
+        "{folder} belongs to UID {uid} ({name}); use the bus as that user (`sudo -u {name}`), or use another folder"
     )]
     ForeignFolder {
         /// The folder.
@@ -45,7 +45,7 @@ pub enum HomeError {
     },
     /// Another user has put a segment among the bus's segments.
     #[error(
-        "{path} belongs to UID {uid} ({name}), who could end every process of this bus with it; remove it (`sudo rm {path}`), or name another folder with --bus"
+        "{path} belongs to UID {uid} ({name}), who could end every process of this bus with it; remove it (`sudo rm {path}`), or use another folder"
     )]
     ForeignSegment {
         /// The segment.
@@ -57,7 +57,7 @@ pub enum HomeError {
     },
     /// The folder cannot be made or examined.
     #[error(
-        "the bus's folder {folder} cannot be used ({detail}); make it for this user, or name another one with --bus"
+        "the bus's folder {folder} cannot be used ({detail}); make it for this user, or use another one"
     )]
     Folder {
         /// The folder.

@@ -24,7 +24,6 @@
 //! nobody else can put files there. Two processes that take the same unit's name meet in the same
 //! folder. A sweep removes only files of this user's bus.
 
-use std::fmt;
 use std::fs::{self, DirBuilder};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -263,17 +262,6 @@ pub struct OtherHome {
     pub uid: u32,
     /// The owner's name, as `sudo -u` takes it.
     pub name: String,
-}
-
-impl fmt::Display for OtherHome {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { folder, uid, name } = self;
-        let folder = folder.display();
-        write!(
-            formatter,
-            "{folder} belongs to UID {uid} ({name}); use `sudo -u {name} lager ...` there"
-        )
-    }
 }
 
 /// Folders of other users' units on this machine, for a user who finds no unit.

@@ -1,8 +1,8 @@
 //! [`Life`]: a service's sign of life, a file in the unit's folder with the time of its last loop.
 //!
 //! Many services publish again and again, so others see that they go on. A service that does not
-//! publish writes this file instead. Its supervisor and `lager top` read the file, without the bus
-//! and without waiting for any process.
+//! publish writes this file instead. Its supervisor and tools read the file, without the bus and
+//! without waiting for any process.
 //!
 //! ```text
 //!   comm.life:  "4711 73012345678901\n"     process id, and CLOCK_MONOTONIC in ns

@@ -100,7 +100,7 @@ impl fmt::Display for Shortage {
             ),
             Self::Memory { free_kib } => write!(
                 formatter,
-                "{SHARED_MEMORY} is full, {free_kib} KiB are left (ENOSPC); `lager doctor --fix` removes what dead processes left there, `mount -o remount,size=256M {SHARED_MEMORY}` enlarges it"
+                "{SHARED_MEMORY} is full, {free_kib} KiB are left (ENOSPC); remove what dead processes left there, or enlarge it: `mount -o remount,size=256M {SHARED_MEMORY}`"
             ),
             Self::Names => write!(
                 formatter,

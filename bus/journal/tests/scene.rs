@@ -179,7 +179,7 @@ fn a_thought_is_a_line_of_a_log_and_a_failure_is_a_warning() {
     };
     let shown = scene.take("log/thought", BEGIN, &message(thought));
     let log = of(&shown, View::Log).unwrap();
-    assert_eq!(log["message"], "Product 3 is delivered. I go back.");
+    assert_eq!(log["message"], "Goods 3 are delivered. I go back.");
     assert_eq!((&log["name"], &log["level"]), (&"logic".into(), &2.into()));
     thought.kind = ThoughtKind::Failed.into();
     thought.failure = Failure {

@@ -163,6 +163,6 @@ pub use hello::Hello;
 pub use listed::{Block, Listed, Queued};
 pub use order::{ActionError, Order, Spelled};
 pub use proof::Proof;
-pub use report::{Event, EventKind, Latency, Report, TruePose};
+pub use report::{Event, Happened, Latency, Report, TruePose};
 pub use state::State;
 pub use thinks::Thinks;

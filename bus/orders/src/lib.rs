@@ -1,6 +1,7 @@
 //! The orders of an operator to a robot, how long each holds, and the sentences about them.
 //!
 //! - [`Action`]: what an operator can ask.
+//! - [`EventKind`]: what happens on a mission.
 //! - [`lease`]: how long an order holds, and how late one may come.
 //! - [`Moment`]: a time on both clocks, robot time and real time.
 //! - [`Late`]: finds out how late a page's line arrives.
@@ -17,6 +18,7 @@
 extern crate alloc;
 
 mod action;
+mod event;
 mod late;
 pub mod lease;
 mod mode;
@@ -25,6 +27,7 @@ mod reason;
 mod sentence;
 
 pub use action::{Action, LeaseMs, Put, Wheels};
+pub use event::EventKind;
 pub use late::Late;
 pub use mode::{Mode, Pick};
 pub use moment::Moment;

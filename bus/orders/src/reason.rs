@@ -76,6 +76,12 @@ codes! {
     NotLines = "not_lines",
     OtherLanguage = "other_language",
     NoToken = "no_token",
+    OtherHost = "other_host",
+    OtherPage = "other_page",
+    NoFile = "no_file",
+    PagesFull = "pages_full",
+    NoHistory = "no_history",
+    HistoryBusy = "history_busy",
     TooMuch = "too_much",
     DriverOnly = "driver_only",
     Plain = "plain",
@@ -297,15 +303,15 @@ mod tests {
             ),
             (
                 FloorError::ProductNegative { number: -1 },
-                "product -1 has a negative number; numbers start at 0",
+                "goods -1 have a negative number; numbers start at 0",
             ),
             (
                 FloorError::TooManyProducts { count: 257 },
-                "there are 257 products; at most 256 fit",
+                "the warehouse has 257 goods; at most 256 fit",
             ),
             (
                 FloorError::ProductTwice { id: 7, index: 1 },
-                "product 7 is listed twice; every product needs a number of its own",
+                "goods 7 are listed twice; all goods need a number of their own",
             ),
             (
                 FloorError::ProductOutside {
@@ -313,7 +319,7 @@ mod tests {
                     square: node(3, 0),
                     size,
                 },
-                "product 7 stands in the square (3, 0), but the last one is (2, 1)",
+                "goods 7 stand in the square (3, 0), but the last one is (2, 1)",
             ),
         ];
         for (error, sentence) in sentences {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use lager_orders::{Code, Language, Reason, Sentence};
+use lager_orders::{Code, EventKind, Language, Reason, Sentence};
 
 /// The keys in a text.
 fn keys(text: &str) -> BTreeSet<&str> {
@@ -33,13 +33,43 @@ fn every_sentence_stands_in_both_languages_with_the_same_values() {
         let english = [" the ", " is ", " it ", " are ", " has "];
         let left = english.iter().any(|word| sentence.swedish.contains(word));
         assert!(!left, "{}", sentence.swedish);
-        // A page has buttons instead of a terminal's commands.
-        for command in ["`lager resume", "`lager map", "`lager mode", "`lager queue"] {
-            assert!(!sentence.english.contains(command), "{}", sentence.name);
-        }
     }
     for code in Code::ALL {
         assert!(names.contains(code.as_str()), "{code:?} has no sentence");
+    }
+    for kind in EventKind::ALL {
+        let name = format!("event_{}", kind.as_str());
+        assert!(names.contains(name.as_str()), "{kind:?} has no sentence");
+    }
+}
+
+/// The one sentence whose reader writes lines of text: it answers a program that connects.
+const FOR_PROGRAMS: &str = "hello_first";
+
+#[test]
+fn a_page_is_told_no_command_of_a_terminal() {
+    for sentence in Sentence::all().filter(|sentence| sentence.name != FOR_PROGRAMS) {
+        // In Swedish the name of the program is also the word for a warehouse.
+        let names_one = sentence.english.contains("lager ");
+        let quotes_one = [sentence.english, sentence.swedish].map(|text| text.contains('`'));
+        assert!(!names_one && quotes_one == [false; 2], "{sentence:?}");
+    }
+}
+
+#[test]
+fn only_thoughts_are_of_the_first_person_and_all_call_goods_goods() {
+    for sentence in Sentence::all() {
+        let words = |text: &'static str| text.split(|c: char| !c.is_alphabetic());
+        if !sentence.name.starts_with("thought_") {
+            let is_first = |word: &str| ["I", "me", "my"].contains(&word);
+            assert!(!words(sentence.english).any(is_first), "{sentence:?}");
+            let is_first = |word: &str| {
+                ["jag", "mig", "min", "mitt", "mina"].contains(&word.to_lowercase().as_str())
+            };
+            assert!(!words(sentence.swedish).any(is_first), "{sentence:?}");
+        }
+        let english = sentence.english.replace("{product}", "");
+        assert!(!english.to_lowercase().contains("product"), "{sentence:?}");
     }
 }
 

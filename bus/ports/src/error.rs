@@ -49,7 +49,7 @@ pub enum OpenError {
 pub enum PortError {
     /// All places for observers are taken.
     #[error(
-        "`{topic}` already has {limit} observers, which is the limit; stop one of them (`lager topic info {topic}` lists them) and try again"
+        "`{topic}` already has {limit} observers, which is the limit; stop one of them and try again"
     )]
     TooManyObservers {
         /// The topic.
@@ -97,7 +97,7 @@ pub enum PortError {
     },
     /// A running process uses another layout or other limits.
     #[error(
-        "`{topic}` is in use with another layout or other limits ({difference}): a process of another build of lager is running; stop all processes that use it, bring them to one build and start them again"
+        "`{topic}` is in use with another layout or other limits ({difference}): a process of another build is running; stop all processes that use it, bring them to one build and start them again"
     )]
     OtherLayout {
         /// The topic or request.
@@ -115,7 +115,7 @@ pub enum PortError {
     },
     /// The shared files make no sense.
     #[error(
-        "the shared files of `{topic}` are damaged or belong to another version of iceoryx2 than 0.10.0; stop every process on this bus, start again, and if it stays so run `lager doctor`"
+        "the shared files of `{topic}` are damaged or belong to another version of iceoryx2 than 0.10.0; stop every process on this bus and start again"
     )]
     Damaged {
         /// The topic or request.

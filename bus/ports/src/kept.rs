@@ -13,6 +13,9 @@ use crate::error::{PortError, ReceiveError};
 use crate::fault::TransportFault;
 use crate::subscriber::Subscriber;
 
+/// How long a restarted service waits for the value that its predecessor left, in real time.
+pub const KEPT_WAIT: Duration = Duration::from_millis(500);
+
 /// Why it is not known whether a value was kept.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum KeptError {

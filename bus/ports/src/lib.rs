@@ -79,7 +79,7 @@ pub use fault::{Difference, TransportFault};
 pub use found::{Found, FoundSample};
 pub use introspect::{Layout, NodeInfo, NodeState, Peer, TopicInfo, nodes, remove_stale_nodes};
 pub use keeper::{Keeper, KeeperError};
-pub use kept::KeptError;
+pub use kept::{KEPT_WAIT, KeptError};
 pub use publisher::{Loan, Publisher};
 pub use request::{Client, Server};
 pub use source::{Look, Source};

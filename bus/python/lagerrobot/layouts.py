@@ -261,6 +261,7 @@ class InputKind(enum.IntEnum):
     Horn = 15
     WayBlocked = 16
     WayOpened = 17
+    GoodsGoneEarlier = 18
 
 
 class GoneWhy(enum.IntEnum):
@@ -268,6 +269,7 @@ class GoneWhy(enum.IntEnum):
     PickedUp = 1
     NotFound = 2
     Told = 3
+    EarlierRun = 4
 
 
 class EventKind(enum.IntEnum):
@@ -810,7 +812,7 @@ class Order(Layout):
 
 class Input(Layout):
     _type_name_ = "lager::Input"
-    _hash_ = 0x3259F9236B892827
+    _hash_ = 0x5051A29C9CD25DBE
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -830,7 +832,7 @@ class Input(Layout):
 
 class NavigatorInputs(Layout):
     _type_name_ = "lager::NavigatorInputs"
-    _hash_ = 0xBB3F5171923A8677
+    _hash_ = 0x768F8BE842861A93
     _fields_ = [
         ("first", ctypes.c_uint64),
         ("commands", Sent),
@@ -879,7 +881,7 @@ class WaitingOrder(Layout):
 
 class GoneGoods(Layout):
     _type_name_ = "lager::GoneGoods"
-    _hash_ = 0xA62C4245DFB44F20
+    _hash_ = 0xB9F54BEDE12E906B
     _fields_ = [
         ("product", ctypes.c_int32),
         ("since_s", ctypes.c_uint32),
@@ -897,7 +899,7 @@ class GoneGoods(Layout):
 
 class OrderQueue(Layout):
     _type_name_ = "lager::OrderQueue"
-    _hash_ = 0xF73014E06E95930F
+    _hash_ = 0x5F80D95FD3F6F69E
     _fields_ = [
         ("order_id", ctypes.c_uint32),
         ("product", ctypes.c_int32),

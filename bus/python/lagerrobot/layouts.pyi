@@ -240,12 +240,14 @@ class InputKind(enum.IntEnum):
     Horn = 15
     WayBlocked = 16
     WayOpened = 17
+    GoodsGoneEarlier = 18
 
 class GoneWhy(enum.IntEnum):
     Delivered = 0
     PickedUp = 1
     NotFound = 2
     Told = 3
+    EarlierRun = 4
 
 class EventKind(enum.IntEnum):
     InPosition = 0

@@ -107,7 +107,7 @@ fn a_thought_is_values_and_becomes_a_sentence_where_it_is_read() {
         (&"Fetching".into(), &"Logic".into(), &3.into())
     );
     assert_eq!(there_and_back(&thought), thought);
-    assert_eq!(thought.to_string(), "I fetch product 7; 3 crossings to go.");
+    assert_eq!(thought.to_string(), "I fetch goods 7; crossings to go: 3.");
 }
 
 #[test]

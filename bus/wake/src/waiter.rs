@@ -14,9 +14,8 @@
 //! Looking gains more if that kernel thread runs on the core of the waiter that it serves. If
 //! another core calls it, it starts after an interrupt, which took 8 to 18 us in a virtual machine,
 //! twice for each frame of the robot's path. With the kernel's workers bound to the core of the
-//! bridge (`lager doctor` says how), the path took 0.39 to 0.41 of its time with sleeping waiters,
-//! and 0.77 to 0.82 with workers on any core. The runs took turns, and both took 36 % of a core
-//! (two cores, 2026-11-27).
+//! bridge, the path took 0.39 to 0.41 of its time with sleeping waiters, and 0.77 to 0.82 with
+//! workers on any core. The runs took turns, and both took 36 % of a core (two cores, 2026-11-27).
 
 use core::cell::{Cell, RefCell};
 use core::fmt;

@@ -12,7 +12,8 @@
 //! allow what neither of them allows. The carry pose stays on the Pi, because the code that turns
 //! the wheels needs it there.
 //!
-//! The type stands here because configuration, bridge, board and simulator must agree on it.
+//! The type stands here because configuration, bridge, board and simulator must agree on it. Its
+//! default is the robot of the simulator's world, and the profile of a board that has got none.
 
 mod rules;
 
@@ -103,53 +104,82 @@ pub struct ArmPose {
     pub wrist: u16,
 }
 
-/// What a robot's arm may do. [`Default`] is the robot of the simulator's world, and the profile of
-/// a board that has received none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
-pub struct ArmProfile {
-    /// Torque limit of every servo, 1 to 1023 of full.
-    pub torque_limit: u16,
-    /// Load that ends a squeeze, 1 to 1023 of full.
-    pub squeeze_load: u16,
-    /// Gripper position when open.
-    pub gripper_open: u16,
-    /// Gripper position when closed on nothing.
-    pub gripper_closed: u16,
-    /// The positions to which each joint may go.
-    pub limits: JointLimits,
-    /// Where the arm goes after it has let go.
-    pub neutral: ArmPose,
-    /// Where the arm lets goods go.
-    pub drop: ArmPose,
-    /// Where the arm is while the robot drives with goods.
-    pub carry: ArmPose,
+impl ArmPose {
+    const RAISED: Self = Self {
+        base: 512,
+        shoulder: 600,
+        elbow: 400,
+        wrist: 512,
+    };
 }
 
-impl Default for ArmProfile {
-    fn default() -> Self {
-        let raised = ArmPose {
-            base: 512,
-            shoulder: 600,
-            elbow: 400,
-            wrist: 512,
-        };
-        Self {
-            torque_limit: SERVO_MAX,
-            squeeze_load: 300,
-            gripper_open: 512,
-            gripper_closed: 210,
-            limits: JointLimits::default(),
-            neutral: raised,
-            drop: ArmPose {
-                base: 512,
-                shoulder: 300,
-                elbow: 512,
-                wrist: 512,
-            },
-            carry: raised,
+/// Declares a profile, which is also a section of the configuration: its keys, their defaults, and
+/// the explanations that `lager config` prints.
+macro_rules! profile {
+    (
+        $(#[doc = $about:literal])*
+        pub struct $name:ident {
+            $(
+                $(#[doc = $explained:literal])*
+                pub $key:ident: $kind:ty = $default:expr,
+            )*
         }
+    ) => {
+        $(#[doc = $about])*
+        // The file has [lowest, highest] for limits, which is no link.
+        #[allow(rustdoc::broken_intra_doc_links)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+        pub struct $name {
+            $(
+                $(#[doc = $explained])*
+                pub $key: $kind,
+            )*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($key: $default,)* }
+            }
+        }
+
+        impl $name {
+            /// The lines that explain the section to a person.
+            pub const ABOUT: &[&str] = &[$($about),*];
+            /// The keys of the section, each with the lines that explain it.
+            pub const KEYS: &[(&str, &[&str])] = &[$((stringify!($key), &[$($explained),*])),*];
+        }
+    };
+}
+
+profile! {
+    /// What the arm may do; the steering board is told at every start, and the arm stands until
+    /// the board has taken it. Positions are those of the servos, 0 to 1023, 0.29 degrees each;
+    /// torque and load are 1 to 1023 of full.
+    pub struct ArmProfile {
+        /// Torque limit of all servos ...
+        pub torque_limit: u16 = SERVO_MAX,
+        /// ... and load that ends a squeeze.
+        pub squeeze_load: u16 = 300,
+        /// Position of the gripper when open, ...
+        pub gripper_open: u16 = 512,
+        /// ... and when closed on nothing.
+        pub gripper_closed: u16 = 210,
+        /// Where each joint may be sent, [lowest, highest]. A step that would lead outside is
+        /// refused. Of the shoulder and the elbow the first servo counts (2 and 4); the other one
+        /// faces it.
+        pub limits: JointLimits = JointLimits::default(),
+        /// Where the arm goes when it has let go of goods, ...
+        pub neutral: ArmPose = ArmPose::RAISED,
+        /// ... where it lets go, ...
+        pub drop: ArmPose = ArmPose {
+            shoulder: 300,
+            elbow: 512,
+            ..ArmPose::RAISED
+        },
+        /// ... and where it is while the robot drives with goods.
+        pub carry: ArmPose = ArmPose::RAISED,
     }
 }
 

@@ -8,6 +8,22 @@
 use crate::bytes::{Bytes, Fault};
 use crate::handshake::ResetCause;
 
+/// The index, which is its id - 1, of the servo that moves each joint, the first one of a pair.
+pub mod servo {
+    /// Turns the arm on the robot.
+    pub const BASE: usize = 0;
+    /// Lifts the upper arm, with the next servo.
+    pub const SHOULDER: usize = 1;
+    /// Lifts the forearm, with the next servo.
+    pub const ELBOW: usize = 3;
+    /// Lifts the gripper.
+    pub const WRIST: usize = 5;
+    /// Turns the gripper.
+    pub const ROTATION: usize = 6;
+    /// Opens and closes the gripper.
+    pub const GRIPPER: usize = 7;
+}
+
 /// One servo of the arm, as it last answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ArmData {

@@ -32,7 +32,7 @@ mod steer;
 mod text;
 
 pub use arm::{ArmLimits, ArmPose, ArmProfile, ArmProfileError, JointLimits, SERVO_MAX};
-pub use board::{ArmData, BoardStatus};
+pub use board::{ArmData, BoardStatus, servo};
 pub use bytes::PAYLOAD_LENGTH;
 pub use command::{ArmCommand, Command, WheelCommand};
 pub use crc::checksum;

@@ -155,32 +155,6 @@ impl OperatorCommand {
         }
     }
 
-    /// The key on the operator's panel, if there is one (K).
-    pub const fn key(self) -> Option<&'static str> {
-        Some(match self {
-            Self::Stop | Self::FollowForward | Self::FollowBackward => return None,
-            Self::Forward => "Up",
-            Self::Backward => "Down",
-            Self::Left => "Left",
-            Self::Right => "Right",
-            Self::LeftDiag => "PgUp",
-            Self::RightDiag => "PgDn",
-            Self::Arm(arm) => match arm.0 {
-                ArmCommand::Clockwise => "1",
-                ArmCommand::CounterClockwise => "2",
-                ArmCommand::In => "q",
-                ArmCommand::Out => "w",
-                ArmCommand::Up => "a",
-                ArmCommand::Down => "s",
-                ArmCommand::Left => "z",
-                ArmCommand::Right => "x",
-                ArmCommand::Squeeze => ",",
-                ArmCommand::Release => ".",
-                ArmCommand::Drop => return None,
-            },
-        })
-    }
-
     /// The wheel command with this name.
     pub fn wheel(name: &str) -> Option<Self> {
         Self::ALL

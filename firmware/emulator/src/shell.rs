@@ -19,7 +19,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
-use lager_plant::{Hand, Report, WorldState};
+use lager_plant::{Hand, Report, World, WorldState};
 use lager_pty::{Port, PtyError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
@@ -34,8 +34,6 @@ const SLICE: Duration = Duration::from_micros(500);
 const SHORTEST_SLEEP: Duration = Duration::from_micros(200);
 /// If the chips are behind by more than this, in real time, the pace starts again from now.
 const GIVE_UP: Duration = Duration::from_millis(20);
-/// Time between two lines of truth, in chip time.
-const TRUTH_PERIOD: Duration = Duration::from_millis(20);
 
 /// Both boards have sent their first bytes by then, in chip time: their start-up takes 65 ms.
 const FIRST_BYTES: Duration = Duration::from_millis(100);
@@ -279,7 +277,7 @@ impl Shell {
             return Ok(());
         }
         self.changes_told = changes;
-        self.truth_due = now + TRUTH_PERIOD;
+        self.truth_due = now + World::TRUTH_PERIOD;
         write_line(&Report::Truth(self.rig.truth()))
     }
 

@@ -13,8 +13,11 @@
 //! claw is 80 mm open. The mirrored servo of a pair stands at 1023 minus its partner's position.
 //! The direction in which a servo counts depends on its mounting; the constants below fix it.
 
-/// Number of servos (AMB-32).
+/// Number of servos (AMB-32). `lager_wire` says it too: a world knows of no packets.
 pub const SERVOS: usize = 8;
+/// The servos' positions before a robot starts: the pose for driving, the claw open. An unpowered
+/// arm stays where somebody put it.
+pub const RESTING: [u16; SERVOS] = [512, 600, 423, 400, 623, 512, 512, 512];
 /// Radians per unit of position: 1024 units span 300 degrees.
 pub const UNIT: f64 = 300.0 / 1023.0 * core::f64::consts::PI / 180.0;
 

@@ -14,6 +14,9 @@ pub struct Noise {
 /// The step of the counter: 2^64 divided by the golden ratio, odd.
 const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
+/// The number of the stream that spreads the start times of the boards in a world.
+pub const START_STREAM: u64 = 100;
+
 impl Noise {
     /// Stream number `stream` of `seed`. Streams of one seed are independent of each other.
     pub fn new(seed: u64, stream: u64) -> Self {

@@ -103,6 +103,8 @@ impl World {
     /// The length of the steps in which the world advances.
     pub const STEP: Duration = Duration::from_millis(1);
     const STEP_NS: u64 = 1_000_000;
+    /// The time between two reports of where a simulated robot really is, in robot time.
+    pub const TRUTH_PERIOD: Duration = Duration::from_millis(20);
 
     /// The warehouse at its start: the robot at the delivery node, the arm at `servo_positions`.
     /// `seed` chooses all imperfections that `make` allows.
@@ -374,14 +376,12 @@ impl World {
 mod tests {
     use super::*;
 
-    const ARM: [u16; SERVOS] = [512, 600, 423, 400, 623, 512, 512, 512];
-
     fn world(seed: u64) -> World {
         World::new(
             &Warehouse::builtin("small").unwrap(),
             seed,
             Make::Nominal,
-            ARM,
+            arm::RESTING,
         )
         .unwrap()
     }
@@ -443,7 +443,7 @@ mod tests {
             side_length_cm: 49,
             ..Warehouse::builtin("small").unwrap()
         };
-        let mut world = World::new(&short, 1, Make::Nominal, ARM).unwrap();
+        let mut world = World::new(&short, 1, Make::Nominal, arm::RESTING).unwrap();
         let refused = Err(WarehouseError::NoRoomForThings(49));
         assert_eq!(world.scatter_obstacles(1, 1), refused);
         assert_eq!(world.scatter_obstacles(0, 1), Ok(()));

@@ -21,6 +21,9 @@ use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlo
 use rustix::termios::{OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
 use thiserror::Error;
 
+/// How many bytes from a board wait, at most, until the Pi reads them; further ones are lost.
+pub const PI_BUFFER: usize = 4_096;
+
 /// Why a port could not be made.
 #[derive(Debug, Error)]
 pub enum PtyError {

@@ -92,12 +92,8 @@ where
 /// Why nobody has answered.
 fn unanswered(error: CallError) -> Reason {
     match error {
-        CallError::NoServer { request, actor } => {
-            Reason::new(Code::NotRunning, &[&actor, &request])
-        }
-        CallError::NoAnswer { request, actor } => {
-            Reason::new(Code::Unanswered, &[&actor, &request])
-        }
+        CallError::NoServer { actor, .. } => Reason::new(Code::NotRunning, &[&actor]),
+        CallError::NoAnswer { actor, .. } => Reason::new(Code::Unanswered, &[&actor]),
         CallError::Transport { .. } => Reason::new(Code::Misread, &[&error]),
     }
 }

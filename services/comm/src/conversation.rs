@@ -57,7 +57,7 @@ use std::collections::{HashMap, VecDeque};
 use lager_floor::ProductId;
 use lager_lines::Name;
 use lager_lines::conversation::{Held, RobotLine, StationLine, StationLineError};
-use lager_lines::extension::{self, EventKind, Hello};
+use lager_lines::extension::{self, Happened, Hello};
 use lager_lines::gag::{Answer, Query, Request};
 use lager_lines::splitter::LineError;
 use lager_operator::{Driving, For, Orders};
@@ -230,7 +230,7 @@ impl Conversation {
     /// A connection has begun.
     pub fn connected(&mut self, now: Moment) {
         if self.up_ns != 0 {
-            self.happened(now, EventKind::LinkBack, "");
+            self.happened(now, Happened::LinkBack, "");
         }
         self.is_up = true;
         self.is_extended = false;
@@ -252,7 +252,7 @@ impl Conversation {
     /// The connection has ended.
     pub fn disconnected(&mut self, now: Moment) {
         if core::mem::take(&mut self.is_up) {
-            self.happened(now, EventKind::LinkLost, "");
+            self.happened(now, Happened::LinkLost, "");
         }
         self.held.clear();
         self.stops.clear();

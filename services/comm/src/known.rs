@@ -73,7 +73,8 @@ impl Known {
             status: self.status,
             queue: self.queue,
             is_simulated: self.is_simulated,
-            stop: Stop::of_word(stop).map(|stop| stop.to_string()),
+            stop: Stop::of_word(stop).map(Stop::cause),
+            refused: None,
         }
     }
 

@@ -14,7 +14,9 @@ use lager_home::Clock;
 use lager_lines::{MAX_LINE, Name, to_line};
 use lager_operator::Act;
 use lager_orders::{Code, Moment};
-use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, Sample, SendError, Subscriber};
+use lager_ports::{
+    Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, Sample, SendError, Subscriber,
+};
 use lager_sample::{Request, Topic};
 use lager_stop::{StopPage, StopWord};
 use lager_topics::{
@@ -35,9 +37,6 @@ use crate::telling;
 /// The longest wait for anything, in real time. Most samples do not wake comm, so that the path has
 /// no further process to wake.
 const LONGEST_WAIT: Duration = Duration::from_millis(10);
-
-/// How long a new comm waits for the map of the one before, in real time.
-const RESUME_WAIT: Duration = Duration::from_millis(500);
 
 /// Why a request was not sent.
 const BUSY: Code = Code::TooMuchAsked;
@@ -135,7 +134,7 @@ impl Shell {
         let Opening { bus, watchdog } = opening;
         watchdog.enter("asking for the map that is kept");
         let kept = match config.resume {
-            true => bus.kept::<NavMap>(RESUME_WAIT).unwrap_or_else(|error| {
+            true => bus.kept::<NavMap>(KEPT_WAIT).unwrap_or_else(|error| {
                 tracing::warn!("the map is asked for anew: {error}");
                 None
             }),

@@ -6,11 +6,11 @@
 
 use lager_floor::{Node, Place, ProductId};
 use lager_lines::extension::{
-    Block, Degrees, Event, EventKind, Latency, Listed, Loads, Queued, Report, Servos, State,
-    Thinks, TruePose,
+    Block, Degrees, Event, Happened, Latency, Listed, Loads, Queued, Report, Servos, State, Thinks,
+    TruePose,
 };
 use lager_lines::{Name, Text};
-use lager_orders::Moment;
+use lager_orders::{EventKind, Moment};
 use lager_sample::{Coded, Tag};
 use lager_topics::{
     BlockedWays, BoardHealth, CalibratedSensor, Calibration, Durations, Failure, Health, LineFrame,
@@ -117,17 +117,7 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
 
 /// An event, if the language has a word for it.
 pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report> {
-    use lager_topics::EventKind as Bus;
-    let kind = match event.kind.get()? {
-        Bus::InPosition => EventKind::InPosition,
-        Bus::GettingItem => EventKind::GettingItem,
-        Bus::ItemDelivered => EventKind::ItemDelivered,
-        Bus::NextNode => EventKind::NextNode,
-        Bus::Refused => EventKind::Refused,
-        Bus::PickupRefused => EventKind::PickupRefused,
-        Bus::Failed => EventKind::Failed,
-        Bus::WayBlocked => EventKind::WayBlocked,
-    };
+    let kind = event.kind.get()?;
     let passed = Node {
         x: event.x,
         y: event.y,
@@ -143,7 +133,7 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
         _ => event.failure.to_string(),
     };
     Some(Report::Event(Event {
-        kind,
+        kind: Happened::Mission(kind),
         node,
         order: has_order.then_some(event.order_id),
         product: ProductId::new(event.product).filter(|_| has_order),
@@ -152,7 +142,7 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
 }
 
 /// An event of the robot itself, at no place; `text` is the event's text.
-pub(crate) fn happened(kind: EventKind, text: &str, known: &Known) -> Report {
+pub(crate) fn happened(kind: Happened, text: &str, known: &Known) -> Report {
     let passed = known.status.and_then(|status| {
         let (x, y) = (status.x.try_into().ok()?, status.y.try_into().ok()?);
         Some(Node { x, y })

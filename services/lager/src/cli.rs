@@ -399,6 +399,10 @@ pub struct StationArgs {
     /// Start no panel
     #[arg(long, conflicts_with = "panel", help_heading = "Station")]
     pub no_panel: bool,
+    /// Keep no history of the robots; otherwise it lies beside the warehouse's file, in
+    /// FILE.history
+    #[arg(long, help_heading = "Station")]
+    pub no_history: bool,
     /// `up` gives this to every service that it starts again; a station continues without it as
     /// well
     #[arg(long, hide = true)]

@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use lager_home::{Holder, Shortage};
+use lager_home::{Holder, OtherHome, Shortage};
 use lager_topics::{LAGER, called};
 
 use crate::config::Config;
@@ -21,10 +21,7 @@ pub fn must_be_up(config: &Config) -> Result<()> {
     }
     let others: Vec<&str> = up.keys().map(|robot| robot.as_str()).collect();
     let others = match others.as_slice() {
-        [] => match lager_home::other_homes(LAGER.family).first() {
-            Some(other) => other.to_string(),
-            None => "no other robot is up either".to_owned(),
-        },
+        [] => others_folder().unwrap_or_else(|| "no other robot is up either".to_owned()),
         others => format!("up are: {} (--name chooses one)", others.join(", ")),
     };
     bail!(
@@ -32,6 +29,16 @@ pub fn must_be_up(config: &Config) -> Result<()> {
         bus.unit,
         place.folder().display()
     );
+}
+
+/// Where the robots of another user may be.
+pub fn others_folder() -> Option<String> {
+    let OtherHome { folder, uid, name } =
+        lager_home::other_homes(LAGER.family).into_iter().next()?;
+    let folder = folder.display();
+    Some(format!(
+        "{folder} belongs to UID {uid} ({name}); use `sudo -u {name} lager ...` there"
+    ))
 }
 
 /// The damaged segments of the bus, if there are any.
@@ -52,7 +59,12 @@ fn damage(mut segments: Vec<PathBuf>) -> Option<String> {
 pub fn causes(config: &Config) -> Vec<String> {
     let mut causes = Vec::new();
     if let Some(shortage) = Shortage::now() {
-        causes.push(shortage.to_string());
+        causes.push(match shortage {
+            Shortage::Memory { .. } => {
+                format!("{shortage}; `lager doctor --fix` removes what dead processes left there")
+            }
+            _ => shortage.to_string(),
+        });
     }
     let Ok(bus) = config.bus() else {
         return causes;

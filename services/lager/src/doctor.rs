@@ -17,7 +17,6 @@ use anyhow::Result;
 use lager_home::Clock;
 use lager_ports::NodeState;
 use lager_supervisor::console;
-use lager_topics::LAGER;
 use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
@@ -394,13 +393,14 @@ fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
         0 if unknown > 0 => Hint(format!(
             "{alive} processes are on the bus in {folder}, and {unknown} that belong to another user; one user should run all of a robot's services"
         )),
-        0 if alive == 0 && !lager_home::other_homes(LAGER.family).is_empty() => Hint(format!(
-            "nobody is on the bus in {folder}; {removed} files were removed; {}",
-            lager_home::other_homes(LAGER.family)[0]
-        )),
-        0 => Good(format!(
-            "{alive} processes are on the bus in {folder}; {removed} files of dead ones were removed"
-        )),
+        0 => match diagnose::others_folder().filter(|_| alive == 0) {
+            Some(others) => Hint(format!(
+                "nobody is on the bus in {folder}; {removed} files were removed; {others}"
+            )),
+            None => Good(format!(
+                "{alive} processes are on the bus in {folder}; {removed} files of dead ones were removed"
+            )),
+        },
         stale if fix => Bad(format!(
             "{stale} dead processes cannot be removed from the bus in {folder}; stop every process on it, then run this again"
         )),

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use lager_home::ChanceClock;
 use lager_plant::{HandsOff, Report, Warehouse};
-use lager_ports::{Bus, Cause, Publisher};
+use lager_ports::{Bus, Cause, KEPT_WAIT, Publisher};
 use lager_simulator::{answer, message, wish, world_state};
 use lager_supervisor::children::{PATIENCE, ends_within};
 use lager_topics::{Outcome, Truth, TruthPose, WorldAnswer, WorldAsk, WorldRequest};
@@ -32,8 +32,6 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::config::Config;
 
-/// How long to wait for the last truth of the emulator before.
-const KEPT_WAIT: Duration = Duration::from_millis(500);
 /// How long the emulator may take for a request of a person's hands.
 const HANDS_WAIT: Duration = Duration::from_millis(500);
 /// How long the emulator may be silent, in time in which it could have run, before a warning. The

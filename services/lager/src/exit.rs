@@ -5,7 +5,9 @@ use std::process::ExitCode;
 
 use lager_bridge::BridgeError;
 use lager_home::LockError;
+use lager_monitor::ToolError;
 use lager_ports::{OpenError, PortError};
+use lager_recorder::RecordError;
 use lager_supervisor::children::TRY_AGAIN;
 use lager_supervisor::signals::INTERRUPTED;
 
@@ -34,9 +36,13 @@ fn may_try_again(error: &anyhow::Error) -> bool {
     })
 }
 
-fn port_error<'a>(cause: &'a (dyn std::error::Error + 'static)) -> Option<&'a PortError> {
-    match cause.downcast_ref() {
-        Some(BridgeError::Port(error)) => Some(error),
+/// The error of a port, also where a service or a tool passes it on as its own.
+pub fn port_error<'a>(cause: &'a (dyn std::error::Error + 'static)) -> Option<&'a PortError> {
+    if let Some(BridgeError::Port(error)) = cause.downcast_ref() {
+        return Some(error);
+    }
+    match (cause.downcast_ref(), cause.downcast_ref()) {
+        (Some(ToolError::Open(error)), _) | (_, Some(RecordError::Open(error))) => Some(error),
         _ => cause.downcast_ref(),
     }
 }

@@ -87,7 +87,7 @@ fn main() -> ExitCode {
     match ended {
         Ok(code) => code,
         Err(error) => {
-            console::complain(&speaker.line(&format!("{error:#}")));
+            console::complain(&speaker.line(&hint::helped(&error)));
             if exit::may_have_a_cause(&error) {
                 let causes = looked_at.iter().flat_map(diagnose::causes);
                 let busy = time_limit::was_in_vain(&error)
@@ -286,7 +286,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             patience()?;
             stop::run(&config)?
         }
-        Command::Drive { command, seconds } => operator()?.drive(command, seconds)?,
+        Command::Drive { command, seconds } => operator()?.steer(command, seconds)?,
         Command::Resume => {
             // Take the stop of this moment: a later stop must not be released.
             let before = stop::current(&config)?;

@@ -5,8 +5,9 @@
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// The addresses at which others reach `at`, those for other computers first. It is only `at`
-/// itself, unless `at` means all addresses of this machine.
+/// The addresses at which others reach `at`. It is only `at` itself, unless `at` means all
+/// addresses of this machine: then those of its interfaces, and the loopback address only where
+/// there is no interface.
 pub fn reachable(at: SocketAddr) -> Vec<SocketAddr> {
     if !at.ip().is_unspecified() {
         return vec![at];
@@ -16,13 +17,15 @@ pub fn reachable(at: SocketAddr) -> Vec<SocketAddr> {
     if at.is_ipv6() {
         found.extend(global_v6(&read("/proc/net/if_inet6")));
     }
-    // Whatever the kernel lists, this machine reaches itself here.
-    found.push(Ipv4Addr::LOCALHOST.into());
-    let port = at.port();
-    found
-        .into_iter()
-        .map(|ip| SocketAddr::new(ip, port))
-        .collect()
+    at_each(found, at.port())
+}
+
+fn at_each(mut found: Vec<IpAddr>, port: u16) -> Vec<SocketAddr> {
+    if found.is_empty() {
+        found.push(Ipv4Addr::LOCALHOST.into());
+    }
+    let at = |ip| SocketAddr::new(ip, port);
+    found.into_iter().map(at).collect()
 }
 
 /// The same as a list for people, with `as_text` for each.
@@ -121,9 +124,27 @@ fe80000000000000505400fffe000001 02 40 20 80     eth0
                 at.iter()
                     .all(|at| !at.ip().is_unspecified() && at.port() == 7410)
             );
-            assert!(at.contains(&"127.0.0.1:7410".parse().expect("an address")));
-            let said = listed(at[0], |at| format!("http://{at}"));
-            assert!(said.starts_with("http://"), "{said}");
+            let has_others = at.iter().any(|at| !at.ip().is_loopback());
+            let has_own = at.iter().any(|at| at.ip().is_loopback());
+            assert!(has_others != has_own, "{at:?}");
         }
+    }
+
+    #[test]
+    fn each_address_can_be_opened_on_another_computer() {
+        let found = ["192.168.1.5", "2001:db8::5"].map(|ip| ip.parse().expect("an address"));
+        let told: Vec<String> = at_each(found.into(), 7410)
+            .into_iter()
+            .map(|at| listed(at, |at| format!("http://{at}/?token=7")))
+            .collect();
+        assert_eq!(
+            told,
+            [
+                "http://192.168.1.5:7410/?token=7",
+                "http://[2001:db8::5]:7410/?token=7"
+            ]
+        );
+        let alone = at_each(Vec::new(), 7410);
+        assert_eq!(alone, ["127.0.0.1:7410".parse().expect("an address")]);
     }
 }

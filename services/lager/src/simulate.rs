@@ -14,14 +14,14 @@ use lager_bridge::listener::{Heard, Listener};
 use lager_bridge::machine::{BridgeCore, CoreOptions, Effect};
 use lager_bridge::{Counts, PortEvent};
 use lager_logic::{Input, KnownHealth, LogicConfig, Navigator, Outgoing, Part};
-use lager_operator::Act;
+use lager_operator::{Act, Seen};
 use lager_orders::{Moment, Pick};
 use lager_plant::{GoodState, Warehouse};
 use lager_sample::Tag;
 use lager_simulator::{CalibrateError, Robot, RobotOptions, Wire};
 use lager_stop::Stop;
 use lager_supervisor::console;
-use lager_supervisor::mission::{Helper, Mission, Seen, Watch};
+use lager_supervisor::mission::{Helper, Mission, Watch};
 use lager_topics::{
     Ask, Event, EventKind, FailureKind, Health, Hold, Role, SteeringOrder, SteeringReport,
     WarehouseMap,

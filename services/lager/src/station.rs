@@ -16,7 +16,7 @@ use lager_lines::secret::Secrets;
 use lager_panel::{Panel, Tokens};
 use lager_plant::Warehouse;
 use lager_station::files::Hold;
-use lager_station::{Listen, Queues, Server, ServerConfig};
+use lager_station::{History, Listen, Queues, Server, ServerConfig};
 use lager_supervisor::Service;
 use lager_supervisor::children::adopt;
 use lager_supervisor::console;
@@ -94,6 +94,7 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
         },
         gag: Some(gag.clone()),
         queues: Some(Queues::beside(&path)),
+        history: (!args.no_history).then(|| History::beside(&path)),
         warehouse: Some(path),
         otherwise,
         fetch: orders.collect(),
@@ -221,6 +222,10 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
         warehouse: config.station.warehouse.clone(),
         otherwise: Some(goods::configured(config)?),
         queues: config.station.queue.clone(),
+        history: match config.station.history {
+            true => Some(StateFolder::of_robot(&config.state_root()?, &config.name).history()),
+            false => None,
+        },
         fetch: Vec::new(),
     })
 }

@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use lager_home::Clock;
 use lager_operator::{Act, Begun, Driving, For, Ids, Orders, Seen};
 use lager_orders::lease::LATEST_MOVE;
@@ -18,8 +18,8 @@ use lager_supervisor::console;
 use lager_supervisor::hands::Hands;
 use lager_supervisor::stopped::describe;
 use lager_topics::{
-    Health, LinkHealth, MissionEvent, MissionQueue, NavStatus, Refusal, Role, SteeringState,
-    StopCause, WorldRequest,
+    Health, LinkHealth, MissionEvent, MissionQueue, NavStatus, Role, SteeringState, StopCause,
+    WorldRequest,
 };
 use lager_wire::OperatorCommand;
 
@@ -71,16 +71,6 @@ impl Operator {
             patience,
         };
         Ok(operator)
-    }
-
-    /// `lager drive`: ends with the command, after its seconds, or at Ctrl-C. The robot then stands,
-    /// because nobody renews its order.
-    pub fn drive(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
-        let health = self.health()?;
-        if health.mode.get() != Some(Mode::Manual) {
-            bail!("the robot is autonomous; `lager mode manual` lets you drive");
-        }
-        self.steer(command, seconds)
     }
 
     /// `lager resume`: releases the stop that was set when the user gave this command. Says which
@@ -199,20 +189,20 @@ impl Operator {
         self.patience.at_most(Hands::ANSWER)
     }
 
-    /// Gives an order and renews it until it has finished or its time is over.
-    fn steer(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
+    /// `lager drive` and `lager arm`: gives an order and renews it until it has finished, its seconds
+    /// are over, or the user presses Ctrl-C. The robot then stands, because nobody renews its order.
+    pub fn steer(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
         let name = command.name();
-        let health = self.health()?;
-        if health.stopped != 0 {
-            bail!(
-                "the robot is stopped {}; `lager resume` releases the stop",
-                by(&health)
-            );
+        let mut seen = Seen {
+            health: Some(self.health()?),
+            ..Seen::default()
+        };
+        // At goods a person may move the arm of an autonomous robot.
+        if seen.mode() != Some(Mode::Manual) && matches!(command, OperatorCommand::Arm(_)) {
+            let mut status = self.bus.subscriber::<NavStatus>()?;
+            seen.status = Some(first(&mut status, &self.bus, &self.patience)?);
         }
-        if let Some(why) = health.blocked.get().filter(|why| *why != Refusal::None) {
-            bail!("`{name}` is not possible now: {}", hinted(why));
-        }
-        let mode = health.mode.get();
+        must_be_allowed(&seen, command)?;
         let mut state = self.bus.subscriber::<SteeringState>()?;
         let clock = self.bus.clock();
         let end = match seconds {
@@ -244,15 +234,9 @@ impl Operator {
             }
             if let Some(health) = self.health.latest()?.map(|health| *health) {
                 driving.refused(clock.now(), &health);
-                if health.stopped != 0 {
-                    bail!("the robot has been stopped {}", by(&health));
-                }
-                if health.mode.get() != mode {
-                    bail!("the mode has been changed; somebody else steers now");
-                }
-                if let Some(why) = health.blocked.get().filter(|why| *why != Refusal::None) {
-                    bail!("`{name}` was cut short: {}", hinted(why));
-                }
+                seen.health = Some(health);
+                must_be_allowed(&seen, command)
+                    .with_context(|| format!("`{name}` was cut short"))?;
             }
             if let Some(order) = driving.renew(clock.now()) {
                 self.hands.steer(order)?;
@@ -279,6 +263,18 @@ const fn is_for_logic(action: Action) -> bool {
         action,
         Mode(_) | Resume { .. } | Gains { .. } | Calibrate | Obstacle { .. }
     )
+}
+
+/// Refuses a command that nobody may give now.
+fn must_be_allowed(seen: &Seen, command: OperatorCommand) -> Result<()> {
+    match (seen.may_move(command), &seen.health) {
+        (Ok(()), _) => Ok(()),
+        (Err(_), Some(health)) if seen.is_stopped() => bail!(
+            "the robot is stopped {}; `lager resume` releases the stop",
+            by(health)
+        ),
+        (Err(why), _) => bail!(hinted(why)),
+    }
 }
 
 /// Who has stopped the robot, and why.

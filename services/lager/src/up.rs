@@ -88,7 +88,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         (config.station.wanted, Service::Comm),
         (config.gateway.is_wanted(), Service::Gateway),
     ];
-    let told = [external.told].into_iter();
+    let told = [first_line(&config, args)?, external.told].into_iter();
     let told = told.chain(external.panel).chain(external.gateway);
     let plan = Plan {
         config: text,
@@ -117,6 +117,29 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         true => ExitCode::SUCCESS,
         false => exit::not_delivered(),
     })
+}
+
+/// The first line: how the robot ends, and what a person who has just started it can try.
+fn first_line(config: &Config, args: &UpArgs) -> Result<String> {
+    if args.exit_when_done {
+        return Ok("the robot ends with its mission, and with Ctrl-C before that".into());
+    }
+    let lager = match config.name == Config::default().name {
+        true => "lager".to_owned(),
+        false => format!("lager --name {}", config.name),
+    };
+    let panel = match config.station.panel {
+        Some(_) => "open the panel in a browser, or ",
+        None => "",
+    };
+    let products = config.warehouse()?.products;
+    // The first one is fetched already where nobody says otherwise.
+    let fetch = products.get(1).or(products.first());
+    let fetch = fetch.map(|product| format!("`{lager} fetch {}`, ", product.id));
+    Ok(format!(
+        "Ctrl-C ends the robot; {panel}try in a second terminal: `{lager} top`, {}`{lager} stop`, `lager --help`",
+        fetch.unwrap_or_default()
+    ))
 }
 
 /// Removes from the state folder what the next `up` does not need.

@@ -1,16 +1,8 @@
 //! What the navigator knows of the arm: where its joints are, and whether its claw holds something.
 
 use lager_topics::{FailureKind, Joint, SERVO_UNKNOWN, SteeringReport};
+use lager_wire::servo::{BASE, ELBOW, GRIPPER, SHOULDER, WRIST};
 use lager_wire::{ArmPose, ArmProfile};
-
-/// Index of the base's servo in a report.
-pub(crate) const BASE: usize = 0;
-/// Index of the shoulder's servo.
-pub(crate) const SHOULDER: usize = 1;
-/// Index of the elbow's servo.
-pub(crate) const ELBOW: usize = 3;
-const WRIST: usize = 5;
-const CLAW: usize = 7;
 
 /// The last report of the arm.
 #[derive(Clone, Copy, Debug)]
@@ -46,8 +38,8 @@ impl ArmSeen {
                 (*known, *is_heard) = (position, true);
             }
         }
-        if report.servo_position[CLAW] != SERVO_UNKNOWN {
-            self.claw_load = report.servo_load[CLAW];
+        if report.servo_position[GRIPPER] != SERVO_UNKNOWN {
+            self.claw_load = report.servo_load[GRIPPER];
         }
     }
 
@@ -94,7 +86,7 @@ impl ArmSeen {
     ) -> Option<(FailureKind, i32, i32)> {
         let (closed, least) = (profile.gripper_closed, profile.squeeze_load / 2);
         let load = self.claw_load.unsigned_abs();
-        match self.position(CLAW) {
+        match self.position(GRIPPER) {
             None => Some((FailureKind::ClawUnheard, closed.into(), 0)),
             Some(position) if position.abs_diff(closed) <= margin => {
                 Some((FailureKind::ClawEmpty, closed.into(), position.into()))

@@ -22,7 +22,9 @@ use core::time::Duration;
 
 use lager_home::Clock;
 use lager_orders::lease::LATEST_MOVE_NS;
-use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, Sample, SendError, Subscriber};
+use lager_ports::{
+    Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, Sample, SendError, Subscriber,
+};
 use lager_sample::{Stamp, Topic};
 use lager_topics::{
     InputKind, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,
@@ -48,9 +50,6 @@ const FRAME_PERIOD: Duration = Duration::from_millis(5);
 /// Longest wait for anything, in real time: a wake may be missed, and the shutdown flag is checked
 /// that often.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
-
-/// How long a new logic waits for the status of the one before, in real time.
-const RESUME_WAIT: Duration = Duration::from_millis(500);
 
 /// Runs the logic unit until `shutdown` is requested.
 ///
@@ -89,7 +88,7 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
 
 /// The last sample of an earlier navigator. If it cannot be read, the robot may be anywhere.
 fn kept<T: Topic>(bus: &Bus) -> Option<T::Payload> {
-    let kept = bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
+    let kept = bus.kept::<T>(KEPT_WAIT).unwrap_or_else(|error| {
         tracing::warn!("the earlier navigator's {} is lost: {error}", T::NAME);
         None
     });

@@ -522,8 +522,7 @@ mod tests {
         );
         let failure = json!({"kind": "NoWay", "remedy": "Way", "x": 1, "y": 2});
         let told = shown::<MissionEvent>(&[json!({"kind": "Failed", "failure": failure})]);
-        let sentence =
-            "\"There is no way from (1, 2) to where I must go. I go on when a way is open.\"";
+        let sentence = "\"there is no way from (1, 2) to where the robot must go. The robot goes on when a way is open.\"";
         assert!(told.contains(sentence), "{told}");
         assert!(!shown::<MissionEvent>(&[json!({})]).contains('"'));
     }

@@ -22,7 +22,7 @@ use hdrhistogram::Histogram;
 use lager_wake::Pace;
 use serde_json::{Value, json};
 
-use crate::measure::{Gauge, Limits, Plan, Seen};
+use crate::measure::{Arrival, Gauge, Limits, Plan};
 use crate::{ToolError, Tools};
 
 /// The time between two looks. It is a fifth of the other tools' shortest one, so the wait is
@@ -103,7 +103,7 @@ struct Delays {
 }
 
 impl Gauge for Delays {
-    fn add(&mut self, seen: &Seen) {
+    fn add(&mut self, seen: &Arrival) {
         let published = seen.stamp.publish_time_ns;
         self.samples += 1;
         self.written
@@ -154,8 +154,8 @@ mod tests {
 
     use super::*;
 
-    fn seen(source: u64, published: u64, looked_ns: u64, received_ns: u64) -> Seen {
-        Seen {
+    fn seen(source: u64, published: u64, looked_ns: u64, received_ns: u64) -> Arrival {
+        Arrival {
             stamp: Stamp {
                 source_time_ns: source,
                 publish_time_ns: published,

@@ -38,7 +38,7 @@ impl Limits {
 
 /// One sample, as an observer finds it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct Arrival {
     pub(crate) stamp: Stamp,
     /// When the look began that found it.
     pub(crate) looked_ns: u64,
@@ -47,7 +47,7 @@ pub(crate) struct Seen {
 
 /// Measures the samples of one window.
 pub(crate) trait Gauge {
-    fn add(&mut self, seen: &Seen);
+    fn add(&mut self, seen: &Arrival);
 
     /// The gauge of the next window.
     fn next(&self) -> Self;
@@ -112,7 +112,7 @@ impl<W: Write> Tools<'_, W> {
                 let so_far = total;
                 while !is_over && let Some(stamp) = self.receive(&mut from, Stamped)? {
                     let received_ns = Clock::monotonic_ns();
-                    gauge.add(&Seen {
+                    gauge.add(&Arrival {
                         stamp,
                         looked_ns,
                         received_ns,

@@ -7,7 +7,7 @@ use lager_sample::Stamp;
 use lager_wake::Pace;
 use serde_json::{Value, json};
 
-use crate::measure::{Gauge, Limits, Plan, Seen};
+use crate::measure::{Arrival, Gauge, Limits, Plan};
 use crate::{ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
@@ -80,7 +80,7 @@ impl Rate {
 }
 
 impl Gauge for Rate {
-    fn add(&mut self, seen: &Seen) {
+    fn add(&mut self, seen: &Arrival) {
         let stamp = &seen.stamp;
         if let Some(latest_ns) = self.latest_ns() {
             let gap = stamp.publish_time_ns.saturating_sub(latest_ns);
@@ -134,7 +134,7 @@ impl Bandwidth {
 }
 
 impl Gauge for Bandwidth {
-    fn add(&mut self, seen: &Seen) {
+    fn add(&mut self, seen: &Arrival) {
         self.rate.add(seen);
     }
 
@@ -168,8 +168,8 @@ impl Gauge for Bandwidth {
 mod tests {
     use super::*;
 
-    fn seen(publish_time_ns: u64, received_ns: u64) -> Seen {
-        Seen {
+    fn seen(publish_time_ns: u64, received_ns: u64) -> Arrival {
+        Arrival {
             stamp: Stamp {
                 publish_time_ns,
                 source_time_ns: publish_time_ns - 500,

@@ -1,7 +1,9 @@
 //! [`Seen`]: the state of the robot as an operator sees it, and the orders that it allows.
 
 use lager_orders::{Code, Mode, Reason};
-use lager_topics::{Goal, Health, NavigatorStatus, OrderQueue, Outcome, Phase, Refusal};
+use lager_topics::{
+    Failure, Goal, Health, NavigatorStatus, OrderQueue, Outcome, Phase, Refusal, StopCause,
+};
 use lager_wire::{Command, OperatorCommand, WheelCommand};
 
 /// The last sample of each topic; `None` if none has come.
@@ -13,10 +15,13 @@ pub struct Seen {
     pub status: Option<NavigatorStatus>,
     /// The orders that logic has.
     pub queue: Option<OrderQueue>,
+    /// The order that logic refused last: its number, its product, and why. Comm does not keep it,
+    /// because it waits for the answer to each of its own orders.
+    pub refused: Option<(u32, i32, Failure)>,
     /// Whether there is a simulated world.
     pub is_simulated: bool,
-    /// A sentence about the stop in force, if it is known.
-    pub stop: Option<String>,
+    /// The cause of the stop in force, if it is known.
+    pub stop: Option<StopCause>,
 }
 
 impl Seen {
@@ -43,8 +48,8 @@ impl Seen {
 
     /// Why the stop `named` is not released while another one is in force.
     pub fn newer_stop(&self, named: u64) -> Reason {
-        match self.stop.as_ref().filter(|_| self.stop_word() != named) {
-            Some(stop) => Reason::new(Code::NewerStopBy, &[stop]),
+        match self.stop.filter(|_| self.stop_word() != named) {
+            Some(cause) => Reason::new(Code::NewerStopBy, &[&Reason::from(cause).as_str()]),
             // The bridge has seen the other stop but has not reported it yet.
             None => Code::NewerStop.into(),
         }

@@ -4,7 +4,7 @@
 // Lengths and angles are those of the simulator's world (firmware/plant/src/arm.rs); of another arm
 // the drawing shows the right joints bent the right way.
 
-import { make } from "./map.js";
+import { make } from "./svg.js";
 import { say } from "./words.js";
 
 /** Radians of one unit of position, and the middle of the range. */
@@ -37,7 +37,7 @@ export class Arm {
     this.shown = shown;
     this.svg.replaceChildren();
     this.svg.toggleAttribute("hidden", !servos);
-    const positions = servos ? servos.split(",").map((text) => (text === "-" ? null : Number(text))) : [];
+    const positions = read(servos);
     const load = loads.split(",").map(Number);
     if (!positions.length) return;
     this.fromTheSide(positions);
@@ -48,11 +48,8 @@ export class Arm {
   }
 
   fromTheSide(positions) {
-    const upper = Math.PI / 2 + angle(positions[1]);
-    const fore = upper - Math.PI / 2 + angle(positions[3]);
     const side = make("g", { transform: "translate(36 108) scale(0.2 -0.2)" }, this.svg);
-    const elbow = [UPPER_ARM * Math.cos(upper), SHOULDER_HEIGHT + UPPER_ARM * Math.sin(upper)];
-    const claw = [elbow[0] + FOREARM * Math.cos(fore), elbow[1] + FOREARM * Math.sin(fore)];
+    const [elbow, claw] = bent(positions);
     make("path", { class: "ground", d: "M-150 0H310" }, side);
     make("path", { class: "stand", d: `M0 0V${SHOULDER_HEIGHT}` }, side);
     make("polyline", { class: "links", points: `0,${SHOULDER_HEIGHT} ${elbow} ${claw}` }, side);
@@ -61,12 +58,11 @@ export class Arm {
 
   /** Where the base points, and how far the jaws are apart. */
   fromAbove(positions) {
-    const degrees = (-angle(positions[0]) * 180) / Math.PI;
-    const gap = Math.max(0, ((positions[7] ?? CLOSED) - CLOSED) * GAP) / 2;
+    const { degrees, gap } = turned(positions);
     const above = make("g", { transform: `translate(126 88) rotate(${degrees.toFixed(1)}) scale(0.6)` }, this.svg);
     make("circle", { class: "ground", r: 8 }, above);
     make("path", { class: "links", d: "M0 0V-44" }, above);
-    const half = gap / 4 + 2;
+    const half = gap / 8 + 2;
     make("path", { class: "links", d: `M${-half} -60V-46H${half}V-60` }, above);
   }
 
@@ -82,6 +78,31 @@ export class Arm {
     const bar = make("rect", { class: "load", x: 322, y: y - 3, width: (load / 1_023) * 26, height: 6 }, this.svg);
     make("title", {}, bar, say("servo_load", Math.round((load / 1_023) * 100)));
   }
+}
+
+/** The servos' positions from their text; one that is not heard is null. */
+const read = (servos) => (servos ? servos.split(",").map((text) => (text === "-" ? null : Number(text))) : []);
+
+/** Where elbow and claw are seen from the side, in mm from the foot of the base. */
+function bent(positions) {
+  const upper = Math.PI / 2 + angle(positions[1]);
+  const fore = upper - Math.PI / 2 + angle(positions[3]);
+  const elbow = [UPPER_ARM * Math.cos(upper), SHOULDER_HEIGHT + UPPER_ARM * Math.sin(upper)];
+  return [elbow, [elbow[0] + FOREARM * Math.cos(fore), elbow[1] + FOREARM * Math.sin(fore)]];
+}
+
+/** How far the base is turned to the right, in degrees, and how far the jaws are apart, in mm. */
+function turned(positions) {
+  const degrees = (-angle(positions[0]) * 180) / Math.PI;
+  return { degrees, gap: Math.max(0, ((positions[7] ?? CLOSED) - CLOSED) * GAP) };
+}
+
+/** The arm from above, for the map: as `turned`, and how far the claw reaches ahead of the base, in mm; null if unheard. */
+export function above(servos) {
+  const positions = read(servos);
+  if (!positions.length) return null;
+  const [, [reach]] = bent(positions);
+  return { ...turned(positions), reach };
 }
 
 const angle = (position) => ((position ?? CENTRE) - CENTRE) * UNIT;

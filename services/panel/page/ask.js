@@ -7,6 +7,8 @@ import { put, say } from "./words.js";
 
 /** Which way a robot on the delivery corner looks into the warehouse. */
 const inwards = (x) => (x === 0 ? "right" : "left");
+/** The ways to look, from 0 degrees on to the right. */
+const LOOKS = ["up", "right", "down", "left"];
 
 export class Where {
   /** `then` is done once the robot knows where it stands. */
@@ -26,6 +28,23 @@ export class Where {
   /** Whether a robot that has been driven by hand does not know where it stands. */
   isOpen(robot) {
     return Boolean(robot?.speaks && this.link.warehouse && robot.state.phase && robot.state.x_mm === undefined);
+  }
+
+  /** Whether somebody is to say where a robot stands: then a crossing of the map can be pointed at. */
+  isWanted(robot) {
+    return this.parts.dialog.open || this.isOpen(robot);
+  }
+
+  /** The robot stands on a crossing that was pointed at; which way it looks, is asked. */
+  choose([x, y]) {
+    const { form, dialog } = this.parts;
+    if (!dialog.open) this.ask();
+    const { elements } = form;
+    [elements.at.value, elements.x.value, elements.y.value] = ["crossing", x, y];
+    // At first as it looked when it was known last.
+    const { heading } = this.robot()?.pose ?? {};
+    if (heading !== undefined) elements.looks.value = LOOKS[(Math.round(heading / 90) + 40) % 4];
+    elements.looks.focus();
   }
 
   ask(then = null) {

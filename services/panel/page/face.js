@@ -25,8 +25,8 @@ const ASKED_MS = 10_000;
 export const age = (ms) => (ms < 60_000 ? `${Math.max(0, Math.floor(ms / 1_000))} s` : span(ms));
 
 /**
- * The look of a robot's state, its sentence, since when, what there is to add, and what stands at the
- * robot on the map. What is old is not said as if it were so.
+ * The look of a robot's state, its sentence, since when, what there is to add, what stands at the
+ * robot on the map, and the name of the remedy that is told. What is old is not said as if it were so.
  */
 export function face(link, robot, now) {
   if (!link.open && link.me === null && link.tries === 0) return { look: "none", said: sentence("face_connecting") };
@@ -54,12 +54,12 @@ export function face(link, robot, now) {
   // Stop and mode stand beside it.
   const end = ["none", "resume", "mode"].includes(remedy) ? null : sentence(`remedy_${remedy}`);
   const unknown = phase && x === undefined && phase !== "waiting_for_map";
-  if (robot.state.stopped === "1") return { look: "stopped", ...stopped(link, robot, [...boards, why, end]), chip: sentence("face_stands") };
+  if (robot.state.stopped === "1") return { look: "stopped", ...stopped(link, robot, [...boards, why, end]), chip: sentence("face_stands"), remedy: end && remedy };
   const look = boards.length || Object.values(HELD_BY).includes(hold) ? "board" : unknown ? "lost" : (why && phase !== "picking") || end || phase === "stuck" ? "needs" : idle(robot);
   const board = Object.keys(HELD_BY).find((name) => hold === HELD_BY[name]);
   const chip = { board: boards[0] ?? (board && unheard(board)), lost: say("place_unknown") }[look];
   const [said, ...rest] = does(robot);
-  return { look, said, more: sentences(...rest, ...boards, why, end), chip };
+  return { look, said, more: sentences(...rest, ...boards, why, end), chip, remedy: end && remedy };
 }
 
 /** Each with a capital; those that are none left out. */
@@ -80,7 +80,7 @@ function silent({ state }) {
 
 /** Why a robot stands, and what it does, in words. */
 function does({ state: { phase, next, product, hold, stopped: isStopped } }) {
-  const act = phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase ?? "";
+  const act = phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? "";
   const held = hold && hold !== "none" && sentence(`hold_${hold}`);
   const isHalted = isStopped === "1";
   const fetches = product !== undefined && say(isHalted ? "was_to_fetch" : "fetches", product);

@@ -1,7 +1,7 @@
 // All robots of the station at a glance, where there are two or more: who needs a person comes first.
 
 import { face, SHAPES } from "./face.js";
-import { make } from "./map.js";
+import { make } from "./svg.js";
 import { decimal, put, say } from "./words.js";
 
 /** The looks, the gravest first. */

@@ -21,8 +21,8 @@
 //
 // <ms> is this page's clock: what was held up on the way moves nothing.
 //
-// Nothing here draws, and nothing here is kept when the page is closed. After a lost connection the
-// station tells again what has happened.
+// Nothing here draws, and nothing here is kept when the page is closed. The station keeps it, and tells
+// on each connection what has happened; its history (services/panel/src/history.rs) has the last day.
 
 /** Older than this, in ms, nothing is shown as true. */
 export const STALE_MS = 500;
@@ -54,6 +54,8 @@ class Robot {
     /** What each line sensor has read in the last calibration, the leftmost first. */
     this.sensors = null;
     this.route = [];
+    /** The products whose goods are not in their place: delivered, in the claw, or somewhere else. */
+    this.gone = new Set();
     /** The ways on which something was put in a simulated world, as `x y side`. */
     this.placed = [];
     /** Where it was when that was known last, and how far it may have come since, in mm. */
@@ -288,23 +290,27 @@ export class Link extends EventTarget {
         const [reading, lowest, highest, both] = rest.slice(4 * sensor, 4 * sensor + 4).map(Number);
         return { reading, lowest, highest, both: both === 1 };
       });
-    } else if (word === "thinks") {
-      robot.thinks = fields(rest);
-    } else if (word === "because") {
-      robot.thinks = { because: rest.join(" ") };
-    } else if (word === "event" || word === "thought" || word === "asked") {
-      // A thought's values come right before it.
-      const values = word === "thought" ? robot.thinks : null;
-      robot.thinks = null;
-      const entry = { at: Date.now() - age, kind: word, words: rest, values };
-      robot.happened(entry);
-      this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
+    } else {
+      const entry = note(robot, word, rest, Date.now() - age);
+      if (entry) this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
     }
   }
 
   emit(name) {
     this.dispatchEvent(new Event(name));
   }
+}
+
+/** Keeps what a line says that happened at a time; the entry of the log, if the line is one. */
+export function note(robot, word, rest, at) {
+  if (word === "thinks") robot.thinks = fields(rest);
+  else if (word === "because") robot.thinks = { because: rest.join(" ") };
+  if (!["event", "thought", "asked"].includes(word)) return null;
+  // A thought's values come right before it.
+  const entry = { at, kind: word, words: rest, values: word === "thought" ? robot.thinks : null };
+  robot.thinks = null;
+  robot.happened(entry);
+  return entry;
 }
 
 /** The page's clock in whole ms. */
@@ -334,12 +340,6 @@ function stray(robot, { x_mm: x, y_mm: y, heading_deg: heading = 0, unsure_mm: u
   }
 }
 
-/** What is kept only to be saved (E11): heading, mode, next node, sensors, servos, orders. */
-const SAVED = ["heading_deg", "looks", "mode", "phase", "node", "next", "code", "stopped", "order", "product", "line_bits", "servos", "loads", "servo_errors"];
-
-/** A number where it is one; rows of digits stay what they are. */
-const plain = (text = null) => (/^-?\d{1,5}$/.test(text) ? Number(text) : text);
-
 /**
  * The time that this part of all frames did not exceed, in us, interpolated within its bucket. `counted` has the
  * number and the count of each bucket in turn.
@@ -367,7 +367,6 @@ function remember(robot, now) {
   const figure = (key) => (state[key] === undefined ? null : Number(state[key]));
   robot.past.push({
     at: now,
-    wall: Date.now(),
     x: figure("x_mm"),
     y: figure("y_mm"),
     line_error: figure("line_error"),
@@ -377,10 +376,8 @@ function remember(robot, now) {
     battery: state.battery_dv === undefined ? null : Number(state.battery_dv) / 10,
     path_p50: robot.latency?.p50 ?? null,
     path_p99: robot.latency?.p99 ?? null,
-    // What is saved besides (E11).
-    ...Object.fromEntries(SAVED.map((key) => [key, plain(state[key])])),
     lost: ["sensor_lost", "steering_lost", "bus_lost"].reduce((sum, key) => sum + Number(state[key] ?? 0), 0),
   });
-  // Ten minutes at twenty a second.
-  if (robot.past.length > 12_000) robot.past.splice(0, 1_000);
+  // A minute at twenty a second.
+  if (robot.past.length > 1_400) robot.past.splice(0, 200);
 }

@@ -12,6 +12,8 @@ import { Link } from "./link.js";
 import { Log } from "./log.js";
 import { WarehouseMap } from "./map.js";
 import { Missions } from "./missions.js";
+import { Notify } from "./notify.js";
+import { offers } from "./offers.js";
 import { called, reason } from "./sentences.js";
 import { Setup } from "./setup.js";
 import { Strips } from "./strips.js";
@@ -33,9 +35,20 @@ const bar = new Bar(link, {
   { button: at("resume"), said: at("resume-said") },
   { button: at("drive-resume"), said: at("drive-resume-said") },
 ]);
-const map = new WarehouseMap(at("map"), at("map-text"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow"), isArmed: () => at("armed").checked }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
+const map = new WarehouseMap(at("map"), {
+  words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words) => put(at("map-said"), words),
+  tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
+  hand: {
+    tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: () => !at("setup").hidden,
+    offers: offers({
+      link, robot, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
+      fetch: (product) => missions.fetch(product, { beside: at("map-undo"), said: at("map-said") }),
+      goods: (square, side) => setup.place(square, side),
+    }),
+  },
+});
 const missions = new Missions(link, {
-  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), plain: at("plain"), clear: at("clear"), undo: at("queue-undo"),
+  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), plain: at("plain"), back: at("goods-back"), backSaid: at("goods-back-said"), backYes: at("goods-back-yes"), backNo: at("goods-back-no"), clear: at("clear"), undo: at("queue-undo"),
   said: at("missions-said"), queue: at("queue"), history: at("history"),
 }, robot);
 const arm = new Arm(at("arm-drawing"));
@@ -56,16 +69,12 @@ const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, 
   at("robot").onchange();
 });
 const strips = new Strips(at("strips"));
-const log = new Log({ filter: at("filter"), entries: at("entries"), csv: at("save-csv"), mcap: at("save-mcap") }, robot);
+const notify = new Notify(link, at("notify"));
+const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
 
-/** Puts an obstacle on an edge of a simulated world, or takes it away. */
-async function meetEdge([x, y, way] = []) {
+/** Puts an obstacle on a way of a simulated world, or takes it away. */
+async function meetWay(edge) {
   const shown = robot();
-  if (!shown || !link.mayDrive) return tell(shown ? "viewer" : "no_robot");
-  // A real floor has its own hands.
-  if (!shown.truth) return tell("real_floor");
-  if (x === undefined) return tell("no_way_here");
-  const edge = `${x} ${y} ${way}`;
   // Where one stands a second put changes nothing, so it is tried to be taken first.
   const take = await link.act(shown, `obstacle take ${edge}`);
   const put = take.done ? take : await link.act(shown, `obstacle put ${edge}`);
@@ -220,8 +229,9 @@ function picture() {
 }
 
 function drawRest(shown, time) {
-  map.draw(shown, time, bar.draw(shown, time));
-  map.drawOthers([...link.robots.values()].filter((other) => other !== shown), time);
+  const face = bar.draw(shown, time);
+  map.draw(shown, [...link.robots.values()].filter((other) => other !== shown), time, face);
+  drawRemedy(face);
   fleet.draw(shown, time);
   missions.draw(shown, time);
   arm.draw(shown);
@@ -231,14 +241,27 @@ function drawRest(shown, time) {
   asked.draw(shown);
   byHand.draw(shown);
   log.draw(shown);
+  notify.draw(time);
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", called(shown.driver)] : ["control_free"];
   put(at("control"), say(...seat));
   // Who has the wheel is not known until the robot is heard again.
   at("control").disabled = !link.open || !shown?.connected;
-  at("map-legend").hidden = !shown?.placed.length && !shown?.blocked.size;
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
+}
+/** The control of this page that ends what is wrong, by the name of the remedy. */
+const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup" };
+
+/** Beside the sentence that names a remedy stands a button that does it, or shows where it is done. */
+function drawRemedy({ remedy }) {
+  const button = at("remedy");
+  const control = REMEDIES[remedy] && at(REMEDIES[remedy]);
+  button.hidden = !control;
+  if (!control) return;
+  put(button, control.textContent);
+  button.disabled = control.disabled;
+  button.onclick = () => control.click();
 }
 link.addEventListener("pose", soon);
 soon();

@@ -1,5 +1,6 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
+import { turnOf, wasDelivered } from "./goods.js";
 import { PLAIN, crossing, reason, sentence } from "./sentences.js";
 import { clock, put, say, span } from "./words.js";
 
@@ -32,6 +33,10 @@ export class Missions {
     };
     parts.picked.onclick = () => this.act("picked");
     parts.pickedForce.onclick = () => this.act("picked force");
+    /** The goods that a person is asked about: they were not in their place. */
+    this.asked = null;
+    parts.backYes.onclick = () => this.back();
+    parts.backNo.onclick = () => this.leave();
     parts.clear.onclick = () => this.takeBack("clear", waiting(this.robot()));
     parts.undo.onclick = () => this.undo();
     this.plain = PLAIN.map((action) => {
@@ -43,15 +48,19 @@ export class Missions {
     link.addEventListener("event", ({ detail }) => this.remember(detail));
   }
 
-  async act(action, robot = this.robot()) {
-    if (!robot) return put(this.parts.said, say("no_robot"));
+  /** Has a robot do something; `said` is where it says why not. */
+  async act(action, robot = this.robot(), said = this.parts.said) {
+    if (!robot) return put(said, say("no_robot"));
     const answer = await this.link.act(robot, action);
-    put(this.parts.said, answer.refused ? reason(answer.refused) : "");
+    put(said, answer.refused ? reason(answer.refused) : "");
     return !answer.refused;
   }
 
-  async fetch(product) {
+  /** Orders goods from the form, or from what stands `beside` it, which says in `said` why not. */
+  async fetch(product, { beside = this.parts.fetch, said = this.parts.said } = {}) {
     const [robot, at] = [this.robot(), performance.now()];
+    // What was delivered is not fetched again before a person has put it back.
+    if (robot?.gone.has(product) && turnOf(robot, product) < 0) return this.ask({ robot, product, beside, said });
     const { ordered } = this;
     const isTwice = ordered.robot === robot && ordered.product === product && (ordered.waits || at - ordered.at < TWICE_MS);
     if (isTwice) {
@@ -60,8 +69,36 @@ export class Missions {
     }
     const order = { robot, product, at, waits: true };
     this.ordered = order;
-    await this.act(`order ${++this.order} ${product}`);
+    await this.act(`order ${++this.order} ${product}`, robot, said);
     order.waits = false;
+  }
+
+  /** Asks where the hand was whether goods are in their place again. */
+  ask(asked) {
+    const { robot, product, beside } = asked;
+    const { back, backSaid, backNo } = this.parts;
+    const delivery = wasDelivered(robot, product);
+    const name = this.names.get(product) ?? product;
+    this.asked = asked;
+    beside.after(back);
+    put(backSaid, delivery ? say("back_delivered", name, clock(delivery.at)) : say("back_away", name));
+    back.hidden = false;
+    backNo.focus();
+  }
+
+  leave() {
+    this.asked = null;
+    this.parts.back.hidden = true;
+  }
+
+  /** They are back: the robot is told so, and fetches them. */
+  async back() {
+    const { robot, product, beside, said } = this.asked;
+    this.leave();
+    if (!(await this.act(`back ${product}`, robot, said))) return;
+    // The station tells the robot's answer before it tells that the goods are back.
+    robot.gone.delete(product);
+    await this.fetch(product, { beside, said });
   }
 
   /** Takes orders out of the queue; `gone` are those, `behind` those that wait behind them. */
@@ -108,6 +145,8 @@ export class Missions {
   }
 
   draw(robot, now) {
+    // Another robot, or the goods are back: the question is over.
+    if (this.asked && (robot !== this.asked.robot || !robot.gone.has(this.asked.product))) this.leave();
     this.drawQueue(robot);
     const { picks, undo } = this.parts;
     this.plain.forEach((button, at) => {

@@ -9,6 +9,7 @@
 //! - [`Panel`]: the server, in one thread with tasks of its own.
 //! - `page`: the files, embedded and packed, and `bundle`: their scripts as one.
 //! - `stop`: STOP by a form, which needs no script and no socket.
+//! - `history`: what the station keeps of the last day, as a table or as lines.
 //! - `access`: who may open the files. `lager_door` decides how many may ask, and for how long.
 //! - `speech`: the lines that page and panel say to each other.
 //! - `socket`: one page's conversation, and `visit`: what one page may do, has asked and has been
@@ -23,6 +24,7 @@
 mod access;
 mod bundle;
 mod handover;
+mod history;
 mod page;
 mod socket;
 mod speech;
@@ -37,15 +39,18 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use axum::Router;
-use axum::extract::{ConnectInfo, DefaultBodyLimit, RawQuery, Request, State, WebSocketUpgrade};
+use axum::extract::{
+    ConnectInfo, DefaultBodyLimit, Path, RawQuery, Request, State, WebSocketUpgrade,
+};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get, post};
 use lager_door::{Door, Limits, Visitor};
 use lager_lines::Name;
-use lager_station::Handle;
+use lager_orders::{Code, Language, Reason};
+use lager_station::{Handle, History};
 use thiserror::Error;
-use tokio::sync::watch;
+use tokio::sync::{Semaphore, watch};
 
 pub use access::Tokens;
 use access::{Access, Rank};
@@ -100,6 +105,8 @@ pub(crate) struct Shared {
     /// What the open pages are called.
     names: Mutex<BTreeSet<String>>,
     open: AtomicUsize,
+    /// Answers of the history that may begin.
+    reads: Arc<Semaphore>,
 }
 
 impl Shared {
@@ -138,6 +145,7 @@ impl Panel {
                 pages: AtomicU32::new(0),
                 names: Mutex::default(),
                 open: AtomicUsize::new(0),
+                reads: Arc::new(Semaphore::new(history::MOST)),
             }),
         })
     }
@@ -186,6 +194,7 @@ impl Panel {
             let router = Router::new()
                 .route("/live", any(live))
                 .route("/stop", post(stop))
+                .route("/history/{what}", get(past))
                 .layer(DefaultBodyLimit::max(stop::LONGEST_BODY))
                 .fallback(get(file))
                 .with_state(self.shared)
@@ -213,13 +222,13 @@ async fn file(
     visitor.has_asked();
     let headers = request.headers();
     if host(&shared.access, headers).is_none() {
-        return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
+        return refuse(StatusCode::MISDIRECTED_REQUEST, Code::OtherHost);
     }
     let path = request.uri().path();
     // The token is taken out of the address, which people copy and histories keep.
     if let Some((token, rest)) = request.uri().query().and_then(taken_out) {
         if shared.access.rank(Some(token)).is_none() {
-            return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+            return refuse(StatusCode::FORBIDDEN, Code::NoToken);
         }
         visitor.admit();
         // Two slashes would be somebody else's address.
@@ -238,15 +247,12 @@ async fn file(
         return guarded(response);
     }
     if rank(&shared.access, headers).is_none() {
-        return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+        return refuse(StatusCode::FORBIDDEN, Code::NoToken);
     }
     visitor.admit();
     let robot = chosen(&shared.handle, request.uri().query());
     let Some((kind, content)) = page::file(path, &robot) else {
-        return refuse(
-            StatusCode::NOT_FOUND,
-            "there is no such file here; the page is at /",
-        );
+        return refuse(StatusCode::NOT_FOUND, Code::NoFile);
     };
     let takes = text(request.headers(), &header::ACCEPT_ENCODING).unwrap_or_default();
     let kind = (header::CONTENT_TYPE, kind);
@@ -279,13 +285,13 @@ async fn stop(
 ) -> Response {
     visitor.has_asked();
     let Some(host) = host(&shared.access, &headers) else {
-        return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
+        return refuse(StatusCode::MISDIRECTED_REQUEST, Code::OtherHost);
     };
     if !is_ours(&shared.access, &headers, host) {
-        return refuse(StatusCode::FORBIDDEN, "STOP is for the panel's own page");
+        return refuse(StatusCode::FORBIDDEN, Code::OtherPage);
     }
     if rank(&shared.access, &headers).is_none() {
-        return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+        return refuse(StatusCode::FORBIDDEN, Code::NoToken);
     }
     visitor.admit();
     let became = stop::stop(&shared.handle, &stop::by(&body), stop::names(&body)).await;
@@ -294,6 +300,44 @@ async fn stop(
         true => axum::response::Html(stop::page(&became)).into_response(),
         false => stop::lines(&became).into_response(),
     })
+}
+
+/// What the station keeps of the last day; the same doors as to the page's files, and no page of
+/// another site gets through them.
+async fn past(
+    State(shared): State<Arc<Shared>>,
+    ConnectInfo(visitor): ConnectInfo<Visitor>,
+    Path(what): Path<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Response {
+    visitor.has_asked();
+    if host(&shared.access, &headers).is_none() {
+        return refuse(StatusCode::MISDIRECTED_REQUEST, Code::OtherHost);
+    }
+    // A program, and an address that a person has written, come from no page.
+    let from = text(&headers, &FETCH_SITE).unwrap_or("none");
+    if !["same-origin", "none"].contains(&from) {
+        return refuse(StatusCode::FORBIDDEN, Code::OtherPage);
+    }
+    if rank(&shared.access, &headers).is_none() {
+        return refuse(StatusCode::FORBIDDEN, Code::NoToken);
+    }
+    visitor.admit();
+    let query = query.unwrap_or_default();
+    let wanted = match history::Wanted::read(&what, &query, History::now_ms()) {
+        Ok(wanted) => wanted,
+        Err(why) => return refuse(StatusCode::BAD_REQUEST, Reason::new(Code::Misread, &[&why])),
+    };
+    let Some(history) = shared.handle.history() else {
+        return refuse(StatusCode::NOT_FOUND, Code::NoHistory);
+    };
+    let Ok(permit) = Arc::clone(&shared.reads).try_acquire_owned() else {
+        return refuse(StatusCode::SERVICE_UNAVAILABLE, Code::HistoryBusy);
+    };
+    // The number of answers and the time of each are limited.
+    visitor.let_stay();
+    guarded(history::answer(history, wanted, permit))
 }
 
 /// Whether the panel's own page asks: by its origin, or by what the browser says of it.
@@ -331,13 +375,6 @@ fn guarded(mut response: Response) -> Response {
     response
 }
 
-const WRONG_TOKEN: &str = "open the address with ?token= that `lager up` or `lager station` has \
-     printed; without it nobody gets in\nöppna adressen med ?token= som `lager up` eller `lager \
-     station` har skrivit ut; utan den kommer ingen in";
-
-const WRONG_HOST: &str = "the panel answers to its address and not to this name\npanelen svarar på \
-     sin adress och inte på detta namn";
-
 /// A page's socket.
 async fn live(
     State(shared): State<Arc<Shared>>,
@@ -348,23 +385,17 @@ async fn live(
 ) -> Response {
     visitor.has_asked();
     let Some(host) = host(&shared.access, &headers) else {
-        return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
+        return refuse(StatusCode::MISDIRECTED_REQUEST, Code::OtherHost);
     };
     let origin = text(&headers, &header::ORIGIN).unwrap_or_default();
     if !shared.access.is_origin(origin, host) {
-        return refuse(
-            StatusCode::FORBIDDEN,
-            "this socket is for the panel's own page",
-        );
+        return refuse(StatusCode::FORBIDDEN, Code::OtherPage);
     }
     let Some(rank) = rank(&shared.access, &headers) else {
-        return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+        return refuse(StatusCode::FORBIDDEN, Code::NoToken);
     };
     let Some(page) = OpenPage::take(&shared, query.as_deref().unwrap_or_default()) else {
-        return refuse(
-            StatusCode::SERVICE_UNAVAILABLE,
-            "as many pages look as may; close one of them",
-        );
+        return refuse(StatusCode::SERVICE_UNAVAILABLE, Code::PagesFull);
     };
     visitor.let_stay();
     upgrade
@@ -435,6 +466,9 @@ fn text<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     headers.get(name)?.to_str().ok()
 }
 
-fn refuse(status: StatusCode, why: &'static str) -> Response {
-    guarded((status, format!("{why}\n")).into_response())
+/// Says no in both languages: a person who is not let in has no page that knows the language.
+fn refuse(status: StatusCode, why: impl Into<Reason>) -> Response {
+    let why = why.into();
+    let said = [Language::English, Language::Swedish].map(|language| why.sentence(language));
+    guarded((status, said.join("\n") + "\n").into_response())
 }

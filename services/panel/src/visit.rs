@@ -6,10 +6,10 @@ use std::sync::{MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
-use lager_lines::extension::{Report, Spelled};
+use lager_lines::extension::Spelled;
 use lager_orders::{Action, Code, Late, Mode, Reason};
 use lager_plant::Warehouse;
-use lager_station::{Awaited, Doing, Driver, Given, Reply, Saving, Saying, Subscription, View};
+use lager_station::{Awaited, Doing, Driver, Given, LastTold, Reply, Saving, Subscription, View};
 use tokio::sync::watch;
 
 use crate::OpenPage;
@@ -52,12 +52,6 @@ pub(crate) struct Visit {
     stayed: Instant,
     there: bool,
     unread: u32,
-}
-
-/// When the last news of a robot that the page was told was new.
-#[derive(Debug, Default)]
-struct LastTold {
-    at: [Option<Duration>; 9],
 }
 
 impl Visit {
@@ -337,13 +331,8 @@ impl Visit {
     fn tell_events(&mut self) {
         while let Some(news) = self.subscription.next(Duration::ZERO) {
             let robot = news.robot;
-            let line = match news.told {
-                Saying::Event(event) => Report::Event(event).to_string(),
-                Saying::Thinks(thinks) => Report::Thinks(thinks).to_string(),
-                Saying::Because(reason) => Report::Because(reason).to_string(),
-                Saying::Thought(text) => format!("thought {text}"),
-                Saying::Asked { by, what } => format!("asked {by} {what}"),
-                Saying::Replied { .. } | Saying::Past { .. } => continue,
+            let Some(line) = news.told.line() else {
+                continue;
             };
             let age = self.page.shared.handle.now().saturating_sub(news.at);
             let _ = match news.at < self.began || age > JUST_NOW {
@@ -387,38 +376,8 @@ impl Visit {
         self.lines.push('\n');
 
         let told = self.robots.entry(name.clone()).or_default();
-        let lines = &mut self.lines;
-        let mut tell = |index: usize, at: Duration, report: &dyn Fn() -> Report| {
-            if told.at[index].replace(at) != Some(at) {
-                let _ = writeln!(lines, "from {name} {}", report());
-            }
-        };
-        if let Some(seen) = &shown.state {
-            tell(0, seen.at, &|| Report::State(Box::new(seen.value.clone())));
-        }
-        if let Some(seen) = &shown.truth {
-            tell(1, seen.at, &|| Report::Truth(seen.value));
-        }
-        if let Some(seen) = &shown.route {
-            tell(2, seen.at, &|| Report::Route(seen.value.clone()));
-        }
-        if let Some(seen) = &shown.blocked {
-            tell(3, seen.at, &|| Report::Blocked(seen.value.clone()));
-        }
-        if let Some(seen) = &shown.queue {
-            tell(4, seen.at, &|| Report::Queue(seen.value.clone()));
-        }
-        if let Some(seen) = &shown.latency {
-            tell(5, seen.at, &|| Report::Latency(seen.value.clone()));
-        }
-        if let Some(seen) = &shown.sensors {
-            tell(6, seen.at, &|| Report::Sensors(seen.value));
-        }
-        if let Some(seen) = &shown.obstacles {
-            tell(7, seen.at, &|| Report::Obstacles(seen.value.clone()));
-        }
-        if let Some(seen) = &shown.gone {
-            tell(8, seen.at, &|| Report::Gone(seen.value.clone()));
+        for (_, report) in told.newer(shown) {
+            let _ = writeln!(self.lines, "from {name} {report}");
         }
     }
 }

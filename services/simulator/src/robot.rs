@@ -19,7 +19,7 @@ use core::time::Duration;
 use lager_ax12::table::MAX_POSITION;
 use lager_control::{SensorConfig, SensorUnit, SteeringConfig, SteeringUnit};
 use lager_plant::arm::SERVOS;
-use lager_plant::noise::Noise;
+use lager_plant::noise::{Noise, START_STREAM};
 use lager_plant::{
     Hand, HandsOff, Make, Pose, Snapshot, Warehouse, WarehouseError, World, WorldState,
 };
@@ -32,8 +32,6 @@ use crate::uart::Uart;
 
 /// The middle of a servo's range.
 const REST: u16 = 512;
-/// The number of the random stream that spreads the boards' first loops.
-const START_STREAM: u64 = 100;
 
 /// The two serial lines, each with the name of its board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -18,8 +18,8 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use lager_home::Clock;
-use lager_plant::{Warehouse, WarehouseError};
-use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, SendError, Server};
+use lager_plant::{Warehouse, WarehouseError, World};
+use lager_ports::{Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, SendError, Server};
 use lager_pty::{Port, PtyError};
 use lager_topics::{TruthPose, WorldRequest};
 use lager_wake::Shutdown;
@@ -36,10 +36,6 @@ const BATCH: Duration = Duration::from_micros(500);
 const LONGEST_SLEEP: Duration = Duration::from_millis(5);
 /// How much real time the world catches up with at once; for the rest it has stood still.
 const MADE_UP: Duration = Duration::from_millis(50);
-/// The time between two samples of `truth/pose`, in robot time.
-const TRUTH_PERIOD: Duration = Duration::from_millis(20);
-/// How long a restarted simulator waits for its predecessor's last sample, in real time.
-const KEPT_WAIT: Duration = Duration::from_millis(500);
 
 /// The configuration of the process.
 #[derive(Clone, Debug)]
@@ -213,7 +209,7 @@ impl Shell {
             return Ok(());
         }
         self.changes_told = changes;
-        self.truth_due = now + TRUTH_PERIOD;
+        self.truth_due = now + World::TRUTH_PERIOD;
         self.truth.send(Cause::OWN, message(&self.robot.truth()))
     }
 

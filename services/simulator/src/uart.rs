@@ -11,10 +11,10 @@
 
 use std::collections::VecDeque;
 
+use lager_pty::PI_BUFFER;
+
 /// The number of bytes that the board can queue.
 const BOARD_QUEUE: u64 = 64;
-/// The number of arrived bytes that the Pi's side keeps until they are read.
-const PI_BUFFER: usize = 4_096;
 
 /// A serial line.
 #[derive(Clone, Debug)]

@@ -162,7 +162,7 @@ impl Outlets {
     }
 
     /// Keeps an event, sorted by the time when it happened.
-    fn keep(&mut self, news: RobotSaid) {
+    pub(crate) fn keep(&mut self, news: RobotSaid) {
         let later = self.kept.iter().rev();
         let later = later.take_while(|other| other.at > news.at).count();
         self.kept.insert(self.kept.len() - later, news);

@@ -34,6 +34,8 @@ pub struct ServerConfig {
     pub otherwise: Option<Warehouse>,
     /// The file of the robots' queues.
     pub queues: Option<PathBuf>,
+    /// The folder of the history; `None` keeps none. See [`History`](crate::History).
+    pub history: Option<PathBuf>,
     /// The products that robots fetch after those that wait already. A product's name needs the
     /// warehouse's file.
     pub fetch: Vec<(Name, Called)>,

@@ -34,6 +34,7 @@ use lager_wire::OperatorArm;
 
 use crate::awaited::{Awaited, Outlets, Saved, Saving, Subscription};
 use crate::given::Given;
+use crate::history::History;
 use crate::robot::Doing;
 use crate::shown::{Saying, Shown};
 use crate::station::{RobotSaid, Station, Wish, WishRefused};
@@ -56,6 +57,7 @@ pub(crate) struct Shared {
     waker: UnixStream,
     /// The warehouse's file, if it has one.
     kept_in: Option<PathBuf>,
+    history: Option<History>,
     /// The origin of the station's clock.
     start: Instant,
 }
@@ -81,7 +83,7 @@ pub struct View {
     pub driver: Option<String>,
     /// The last report of each kind.
     pub shown: Shown,
-    /// The moment, by the station's clock; see [`Seen::age`](crate::Seen::age).
+    /// The moment, by the station's clock; see [`Dated::age`](crate::Dated::age).
     pub now: Duration,
 }
 
@@ -101,6 +103,11 @@ impl Handle {
             };
             station.robots().map(view).collect()
         })
+    }
+
+    /// What the station keeps of the last day, if it does.
+    pub fn history(&self) -> Option<History> {
+        self.shared.history.clone()
     }
 
     /// Subscribes to everything that robots tell from now on.
@@ -261,8 +268,13 @@ impl Drop for Driver {
 
 /// What the threads share.
 impl Handle {
-    pub(crate) fn new(station: Station, waker: UnixStream, kept_in: Option<PathBuf>) -> Self {
-        Self {
+    pub(crate) fn new(
+        station: Station,
+        waker: UnixStream,
+        kept_in: Option<PathBuf>,
+        history: Option<History>,
+    ) -> Self {
+        let handle = Self {
             shared: Arc::new(Shared {
                 state: Mutex::new(State {
                     station,
@@ -272,9 +284,34 @@ impl Handle {
                 changed: Condvar::new(),
                 waker,
                 kept_in,
+                history,
                 start: Instant::now(),
             }),
-        }
+        };
+        handle.remember();
+        handle
+    }
+
+    /// Takes the last news out of the history, so that a page of a new station shows them, too.
+    fn remember(&self) {
+        let Some(history) = &self.shared.history else {
+            return;
+        };
+        let events = history.latest(Subscription::KEPT).unwrap_or_else(|error| {
+            tracing::warn!("the events of before are not shown: {error}");
+            Vec::new()
+        });
+        let (now_ms, now) = (History::now_ms(), self.now());
+        let news = events.into_iter().filter_map(|(robot, at_ms, line)| {
+            let ago = Duration::from_millis(now_ms.saturating_sub(at_ms));
+            Some(RobotSaid {
+                robot: Name::new(robot).ok()?,
+                // What is older than a day was before this clock's time.
+                at: now.checked_sub(ago)?,
+                told: Saying::read(&line)?,
+            })
+        });
+        news.for_each(|news| self.lock().outlets.keep(news));
     }
 
     /// Calls `look` with the station. The station waits meanwhile, so copy and do nothing else.

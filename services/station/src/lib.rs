@@ -13,6 +13,7 @@
 //! - [`Station`]: all robots by their names, and the GaG that speaks for one of them; pure, too.
 //! - [`load`] and [`save`]: the warehouse, in a file that is saved atomically.
 //! - [`Queues`]: the products that each robot will fetch, in a file beside the warehouse's.
+//! - [`History`]: the last day of robots' states and events, in a folder beside the warehouse's file.
 //! - [`files`]: reads, replaces and locks files that a person has named.
 //! - [`Server`]: the sockets, in one thread that waits for all of them.
 //! - [`Handle`]: the station for other threads. They see the last state of each robot with its
@@ -32,6 +33,8 @@ pub mod files;
 mod gate;
 mod given;
 mod handle;
+mod history;
+mod keeper;
 mod queues;
 mod refused;
 mod robot;
@@ -48,10 +51,11 @@ pub use awaited::{Awaited, Saving, Subscription};
 pub use config::{Listen, ServerConfig, ServerError};
 pub use given::Given;
 pub use handle::{Driver, Handle, View};
+pub use history::{Entry, History};
 pub use queues::Queues;
 pub use robot::{ActRefused, CommandRefused, Doing, FetchRefused, Robot};
 pub use server::Server;
-pub use shown::{Reply, Saying, Seen, Shown};
+pub use shown::{Dated, LastTold, Reply, Saying, Shown};
 pub use station::{Output, Peer, RobotSaid, Station, Uses, Wish, WishRefused};
 pub use warehouse::{LoadError, SaveError, find, load, save, told};
 pub use wheel::Key;

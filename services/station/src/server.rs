@@ -40,6 +40,8 @@ use crate::connection::{Connection, Stream};
 use crate::files::{Hold, ReadError};
 use crate::gate::{Gate, Verdict};
 use crate::handle::Handle;
+use crate::history::History;
+use crate::keeper::Keeper;
 use crate::queues::Queues;
 use crate::saver::{Changes, Saver};
 use crate::station::{Output, Peer, Station};
@@ -64,6 +66,8 @@ pub struct Server {
     wakes: UnixStream,
     handle: Handle,
     saver: Saver,
+    /// Keeps the history until it is dropped.
+    _keeper: Option<Keeper>,
     /// Only this station saves in the warehouse's file. Dropped after the saver.
     _hold: Option<Hold>,
     /// The queues as they were saved last.
@@ -145,12 +149,15 @@ impl Server {
         let (wakes, waker) = UnixStream::pair()?;
         wakes.set_nonblocking(true)?;
         waker.set_nonblocking(true)?;
-        let handle = Handle::new(station, waker, config.warehouse.clone());
+        let history = config.history.map(History::new);
+        let handle = Handle::new(station, waker, config.warehouse.clone(), history.clone());
+        let keeper = history.map(|history| Keeper::new(history, handle.clone()));
         Ok(Self {
             robots,
             gag,
             wakes,
             saver: Saver::new(config.warehouse, config.queues, handle.clone()),
+            _keeper: keeper.transpose()?,
             _hold: hold,
             saved,
             handle,

@@ -12,14 +12,14 @@ use lager_wire::LineReading;
 
 /// Something that a robot has told, and when.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen<T> {
+pub struct Dated<T> {
     /// What was told.
     pub value: T,
     /// When, by the station's clock.
     pub at: Duration,
 }
 
-impl<T> Seen<T> {
+impl<T> Dated<T> {
     /// How long ago it was told.
     pub fn age(&self, now: Duration) -> Duration {
         now.saturating_sub(self.at)
@@ -31,23 +31,23 @@ impl<T> Seen<T> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
     /// What it is doing, twenty times a second.
-    pub state: Option<Seen<State>>,
+    pub state: Option<Dated<State>>,
     /// Where a simulated robot really is.
-    pub truth: Option<Seen<TruePose>>,
+    pub truth: Option<Dated<TruePose>>,
     /// The nodes of its way. The robot tells this and the following only when they change.
-    pub route: Option<Seen<Listed<Node>>>,
+    pub route: Option<Dated<Listed<Node>>>,
     /// The ways that it avoids.
-    pub blocked: Option<Seen<Listed<Block>>>,
+    pub blocked: Option<Dated<Listed<Block>>>,
     /// The products that it fetches next by itself, after the present one.
-    pub queue: Option<Seen<Listed<Queued>>>,
+    pub queue: Option<Dated<Listed<Queued>>>,
     /// The things that stand on ways of its simulated world.
-    pub obstacles: Option<Seen<Listed<Place>>>,
+    pub obstacles: Option<Dated<Listed<Place>>>,
     /// The products whose goods are not in their place.
-    pub gone: Option<Seen<Listed<ProductId>>>,
+    pub gone: Option<Dated<Listed<ProductId>>>,
     /// How long it takes to react, about once a second.
-    pub latency: Option<Seen<Box<Latency>>>,
+    pub latency: Option<Dated<Box<Latency>>>,
     /// What each line sensor read in the last calibration, the leftmost first.
-    pub sensors: Option<Seen<[LineReading; 11]>>,
+    pub sensors: Option<Dated<[LineReading; 11]>>,
 }
 
 /// What became of an action or of a stop.
@@ -100,20 +100,93 @@ pub enum Saying {
     },
 }
 
+impl Saying {
+    /// As a line: one of the extension, `thought <text>`, or `asked <name> <what>`. `None` for what
+    /// is not news by itself.
+    pub fn line(&self) -> Option<String> {
+        Some(match self {
+            Self::Event(event) => Report::Event(event.clone()).to_string(),
+            Self::Thinks(thinks) => Report::Thinks(thinks.clone()).to_string(),
+            Self::Because(reason) => Report::Because(reason.clone()).to_string(),
+            Self::Thought(text) => format!("thought {text}"),
+            Self::Asked { by, what } => format!("asked {by} {what}"),
+            Self::Replied { .. } | Self::Past { .. } => return None,
+        })
+    }
+
+    /// Reads such a line.
+    pub(crate) fn read(line: &str) -> Option<Self> {
+        let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
+        match word {
+            "thought" => Some(Self::Thought(Text::new(rest).ok()?)),
+            "asked" => {
+                let (by, what) = rest.split_once(' ')?;
+                let (by, what) = (by.to_owned(), what.to_owned());
+                Some(Self::Asked { by, what })
+            }
+            _ => match Report::read(line)?.ok()? {
+                Report::Event(event) => Some(Self::Event(event)),
+                Report::Thinks(thinks) => Some(Self::Thinks(thinks)),
+                Report::Because(reason) => Some(Self::Because(reason)),
+                _ => None,
+            },
+        }
+    }
+}
+
+/// What somebody has been told of a robot's [`Shown`], as the times of the last reports.
+#[derive(Clone, Debug, Default)]
+pub struct LastTold {
+    at: [Option<Duration>; 9],
+}
+
+impl LastTold {
+    /// The reports that are new since the last call, with their times by the station's clock.
+    pub fn newer(&mut self, shown: &Shown) -> Vec<(Duration, Report)> {
+        let mut newer = Vec::new();
+        let mut last = self.at.iter_mut();
+        let mut tell = |at: Option<Duration>, report: &dyn Fn() -> Option<Report>| {
+            if let (Some(last), Some(at)) = (last.next(), at)
+                && last.replace(at) != Some(at)
+            {
+                newer.extend(report().map(|report| (at, report)));
+            }
+        };
+        macro_rules! tell {
+            ($($field:ident => $report:expr),* $(,)?) => { $(
+                let seen = shown.$field.as_ref();
+                tell(seen.map(|seen| seen.at), &|| seen.map(|seen| $report(seen.value.clone())));
+            )* };
+        }
+        tell! {
+            state => |state| Report::State(Box::new(state)),
+            truth => Report::Truth,
+            route => Report::Route,
+            blocked => Report::Blocked,
+            queue => Report::Queue,
+            latency => Report::Latency,
+            sensors => Report::Sensors,
+            obstacles => Report::Obstacles,
+            gone => Report::Gone,
+        }
+        newer
+    }
+}
+
 impl Shown {
     /// Keeps a state that the robot tells at this moment. Returns news, which nobody keeps here.
     pub(crate) fn take(&mut self, report: Report, at: Duration) -> Option<Saying> {
         let replied = |number, reply| Some(Saying::Replied { number, reply });
         match report {
-            Report::State(state) => self.state = Some(Seen { value: *state, at }),
-            Report::Truth(value) => self.truth = Some(Seen { value, at }),
-            Report::Route(value) => self.route = Some(Seen { value, at }),
-            Report::Blocked(value) => self.blocked = Some(Seen { value, at }),
-            Report::Queue(value) => self.queue = Some(Seen { value, at }),
-            Report::Gone(value) => self.gone = Some(Seen { value, at }),
-            Report::Latency(value) => self.latency = Some(Seen { value, at }),
-            Report::Sensors(value) => self.sensors = Some(Seen { value, at }),
-            Report::Obstacles(value) => self.obstacles = Some(Seen { value, at }),
+            Report::State(state) => self.state = Some(Dated { value: *state, at }),
+            Report::Truth(value) => self.truth = Some(Dated { value, at }),
+            Report::Route(value) => self.route = Some(Dated { value, at }),
+            Report::Blocked(value) => self.blocked = Some(Dated { value, at }),
+            Report::Queue(value) => self.queue = Some(Dated { value, at }),
+            Report::Gone(value) => self.gone = Some(Dated { value, at }),
+            Report::Latency(value) => self.latency = Some(Dated { value, at }),
+            Report::Sensors(value) => self.sensors = Some(Dated { value, at }),
+            Report::Obstacles(value) => self.obstacles = Some(Dated { value, at }),
             Report::Past { ago_ms, report } => {
                 let ago = Duration::from_millis(ago_ms);
                 let told = Box::new(self.take(*report, at)?);

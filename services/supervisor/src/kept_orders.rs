@@ -17,12 +17,10 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use lager_home::Clock;
-use lager_operator::{Act, Ids, Wanted};
+use lager_operator::{Act, Ids, Seen, Wanted};
 use lager_station::files;
 use lager_topics::{Goal, GoneGoods, Input, InputKind, NavigatorStatus, Order, OrderQueue, Phase};
 use serde::{Deserialize, Serialize};
-
-use crate::mission::Seen;
 
 /// How many orders a robot can get back: as many as can wait in it.
 pub const MOST_ORDERS: usize = lager_logic::queue::MOST_ORDERS;
@@ -178,7 +176,7 @@ impl Returned {
         });
         let gone = self.gone.front().map(|product| {
             Act::Press(Input {
-                kind: InputKind::GoodsGone.into(),
+                kind: InputKind::GoodsGoneEarlier.into(),
                 order_id: product.cast_unsigned(),
                 ..Input::default()
             })
@@ -375,7 +373,7 @@ mod tests {
         seen.status = Some(waits());
         let press = returned.step(at(10), &seen);
         assert!(
-            matches!(press, Some(Act::Press(input)) if input.kind == InputKind::GoodsGone && input.order_id == 5),
+            matches!(press, Some(Act::Press(input)) if input.kind == InputKind::GoodsGoneEarlier && input.order_id == 5),
             "{press:?}"
         );
         assert!(returned.step(at(20), &seen).is_none(), "not again so soon");

@@ -17,7 +17,7 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use lager_operator::{Act, Ids, Wanted};
+use lager_operator::{Act, Ids, Seen, Wanted};
 use lager_orders::{Mode, Moment, Pick};
 use lager_sample::Tag;
 use lager_topics::{
@@ -37,19 +37,6 @@ const TRIES: i32 = 5;
 const IDLE: Duration = Duration::from_secs(60);
 /// Orders that wait in the robot at a time, at most; the others are given later.
 const MOST_WAITING: usize = 16;
-
-/// What is seen: the last of each, nothing before the first.
-#[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// The links and who steers.
-    pub health: Option<Health>,
-    /// What logic is doing.
-    pub status: Option<NavigatorStatus>,
-    /// The orders that it has.
-    pub queue: Option<OrderQueue>,
-    /// The order that logic refused last: its number, its product, and why.
-    pub refused: Option<(u32, i32, Failure)>,
-}
 
 /// Who helps a robot whose battery is low or whose arm is in its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

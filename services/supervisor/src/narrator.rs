@@ -4,16 +4,16 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use lager_orders::Mode;
+use lager_operator::Seen;
+use lager_orders::{Mode, Reason};
 use lager_ports::{Bus, Subscriber};
 use lager_topics::{
     Event, EventKind, Goal, GoodState, Health, LinkHealth, LogThought, MissionEvent, MissionQueue,
     NavStatus, NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, StopCause,
-    TruthPose,
+    ThoughtKind, TruthPose,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::mission::Seen;
 use crate::stopped::describe;
 
 /// The observer behind the terminal's lines.
@@ -129,8 +129,10 @@ impl Narrator {
             self.tell_event(&event);
         }
         while let Some(thought) = self.thought.receive()?.map(|thought| *thought) {
-            let from = thought.from.to_string().to_lowercase();
-            self.note(&from, &format!("\"{thought}\""));
+            if thought.kind.get().is_none_or(is_only_thought) {
+                let from = thought.from.to_string().to_lowercase();
+                self.note(&from, &format!("\"{thought}\""));
+            }
         }
         if let Some(truth) = self.truth.latest()? {
             self.heard.push(truth.stamp().writer);
@@ -201,7 +203,8 @@ impl Narrator {
 }
 
 impl Narrator {
-    /// Reports changes of the links and of who may steer.
+    /// Reports changes of the links and of who may steer. For a stop and for the mode, the page has
+    /// sentences of its own: here a person reads how old the stop is, and what releases it.
     fn tell_links(&mut self, before: Option<&Health>, now: &Health) {
         let boards = [
             ("sensor", before.map(|b| b.sensor), now.sensor),
@@ -236,7 +239,8 @@ impl Narrator {
                 &format!("STOPPED {said}; `lager resume` lets the robot go on"),
             );
         } else if is.is_none() && was.is_some() {
-            self.push("bridge", "the stop is released");
+            let released = Reason::of("event_resumed", |_| None);
+            self.push("bridge", &released.to_string());
         }
     }
 
@@ -282,42 +286,62 @@ impl Narrator {
     }
 
     fn tell_event(&mut self, event: &Event) {
-        let product = event.product;
-        match event.kind.get() {
-            Some(EventKind::GettingItem) => {
-                self.push("robot", &format!("fetches product {product}"));
-            }
-            Some(EventKind::ItemDelivered) => {
-                self.push("robot", &format!("DELIVERED product {product}"));
-            }
-            Some(EventKind::Refused) => {
-                let why = event.failure;
-                self.seen.refused = Some((event.order_id, product, why));
-                self.note(
-                    "robot",
-                    &format!("refuses to fetch product {product}: {why}"),
-                );
-            }
-            Some(EventKind::PickupRefused) => {
-                let why = event.failure;
-                self.note("robot", &format!("does not have product {product}: {why}"));
-            }
-            Some(EventKind::WayBlocked) => {
-                let heading = event.heading.to_string().to_lowercase();
-                let (x, y) = (event.x, event.y);
-                self.note(
-                    "robot",
-                    &format!("finds the way from ({x},{y}) heading {heading} blocked"),
-                );
-            }
-            Some(EventKind::Failed) => {
-                let why = event.failure;
-                self.note("robot", &format!("cannot go on: {why}"));
-            }
-            // The lines about logic's activity report these already.
-            Some(EventKind::InPosition | EventKind::NextNode) | None => {}
+        let Event {
+            order_id,
+            product,
+            failure,
+            ..
+        } = *event;
+        let kind = match event.kind.get() {
+            // The lines about logic's activity report the first two already, and a thought reports
+            // the third with what ends it.
+            Some(EventKind::InPosition | EventKind::NextNode | EventKind::Failed) | None => return,
+            Some(kind) => kind,
+        };
+        if kind == EventKind::Refused {
+            self.seen.refused = Some((order_id, product, failure));
+        }
+        let said = Reason::of(&format!("event_{}", kind.as_str()), |key| {
+            Some(match (key, kind) {
+                ("product", _) => product.to_string(),
+                (_, EventKind::WayBlocked) => {
+                    let heading = event.heading.to_string().to_lowercase();
+                    format!("({},{}) heading {heading}", event.x, event.y)
+                }
+                _ => format!("({},{})", event.x, event.y),
+            })
+        });
+        let text = match failure.is_none() {
+            true => said.to_string(),
+            false => format!("{said}: {failure}"),
+        };
+        match kind {
+            EventKind::GettingItem | EventKind::ItemDelivered => self.push("robot", &text),
+            // The robot may find the same thing again and again.
+            _ => self.note("robot", &text),
         }
     }
+}
+
+/// Whether no line about the robot's activity and its events says the same as a thought of this
+/// kind.
+fn is_only_thought(kind: ThoughtKind) -> bool {
+    !matches!(
+        kind,
+        ThoughtKind::WayBlocked
+            | ThoughtKind::OrderRefused
+            | ThoughtKind::Fetching
+            | ThoughtKind::Picking
+            | ThoughtKind::PickupRefused
+            | ThoughtKind::HasGoods
+            | ThoughtKind::Delivered
+            | ThoughtKind::TurnsLeft
+            | ThoughtKind::TurnsRight
+            | ThoughtKind::SeeksStation
+            | ThoughtKind::LeavesToDeliver
+            | ThoughtKind::IsBack
+            | ThoughtKind::Halts
+    )
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! The files that outlive `lager up` and `lager station`: the warehouse that somebody has saved in
-//! the panel, and the orders that wait.
+//! the panel, the orders that wait, and the history of the robots.
 //!
 //! ```text
 //!   the warehouse    in the file that was named, else NAME.toml of a built-in one, in
@@ -34,6 +34,8 @@ const RUNNING: &str = "running.toml";
 const ORDERS: &str = "orders.toml";
 /// The queue of the robot's own station.
 const QUEUE: &str = "queue.toml";
+/// The folder of that station's history.
+const HISTORY: &str = "history";
 
 /// The folder of everything that is kept: the one that the user named, or one in the folder of the
 /// bus if the user named that, or this user's own.
@@ -120,6 +122,11 @@ impl StateFolder {
     /// Where a station keeps its queue.
     pub fn queue(&self) -> PathBuf {
         self.0.join(QUEUE)
+    }
+
+    /// Where a station keeps its history.
+    pub fn history(&self) -> PathBuf {
+        self.0.join(HISTORY)
     }
 
     /// Where the orders of a robot's own queue are kept.

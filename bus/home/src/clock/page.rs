@@ -50,7 +50,7 @@ pub enum ClockError {
     },
     /// The file is something else than a clock page.
     #[error(
-        "{0} is no clock page, or one of another build; name the file that the emulator was given with --clock"
+        "{0} is no clock page, or one of another build; name the file into which the emulated body writes its time"
     )]
     Foreign(PathBuf),
 }

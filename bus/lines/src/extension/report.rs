@@ -3,7 +3,7 @@
 use core::fmt;
 
 use lager_floor::{Node, Place, ProductId};
-use lager_orders::Reason;
+use lager_orders::{EventKind, Reason};
 use lager_wire::LineReading;
 
 use super::fields::Degrees;
@@ -76,7 +76,7 @@ pub enum Report {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Event {
     /// What.
-    pub kind: EventKind,
+    pub kind: Happened,
     /// The node last passed; with `next_node` the one to which the robot goes.
     pub node: Node,
     /// The order it belongs to.
@@ -88,25 +88,11 @@ pub struct Event {
     pub text: Text,
 }
 
-/// A kind of event.
+/// A kind of event: on a mission, or of the robot itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum EventKind {
-    /// The robot stands at the goods.
-    InPosition,
-    /// The robot is on its way to the goods.
-    GettingItem,
-    /// The goods lie at the place of delivery.
-    ItemDelivered,
-    /// The robot goes to a node.
-    NextNode,
-    /// The order is not carried out.
-    Refused,
-    /// The goods are not felt in the gripper, so the robot does not leave.
-    PickupRefused,
-    /// The robot cannot go on.
-    Failed,
-    /// The robot has found the way from the node in a direction blocked (L6).
-    WayBlocked,
+pub enum Happened {
+    /// Something on a mission.
+    Mission(EventKind),
     /// A stop is in force.
     Stopped,
     /// It is not any more.
@@ -121,36 +107,24 @@ pub enum EventKind {
     LinkBack,
 }
 
-impl EventKind {
+impl Happened {
     /// Every kind.
-    pub const ALL: [Self; 14] = [
-        Self::InPosition,
-        Self::GettingItem,
-        Self::ItemDelivered,
-        Self::NextNode,
-        Self::Refused,
-        Self::PickupRefused,
-        Self::Failed,
-        Self::WayBlocked,
-        Self::Stopped,
-        Self::Resumed,
-        Self::Mode,
-        Self::Restarted,
-        Self::LinkLost,
-        Self::LinkBack,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        let own = [
+            Self::Stopped,
+            Self::Resumed,
+            Self::Mode,
+            Self::Restarted,
+            Self::LinkLost,
+            Self::LinkBack,
+        ];
+        EventKind::ALL.into_iter().map(Self::Mission).chain(own)
+    }
 
     /// The word.
     pub const fn as_str(self) -> &'static str {
         match self {
-            Self::InPosition => "in_position",
-            Self::GettingItem => "getting_item",
-            Self::ItemDelivered => "item_delivered",
-            Self::NextNode => "next_node",
-            Self::Refused => "refused",
-            Self::PickupRefused => "pickup_refused",
-            Self::Failed => "failed",
-            Self::WayBlocked => "way_blocked",
+            Self::Mission(kind) => kind.as_str(),
             Self::Stopped => "stopped",
             Self::Resumed => "resumed",
             Self::Mode => "mode",
@@ -161,7 +135,7 @@ impl EventKind {
     }
 
     fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.as_str() == word)
+        Self::all().find(|kind| kind.as_str() == word)
     }
 }
 
@@ -184,7 +158,8 @@ impl Latency {
     pub const MOST: u32 = 999_999;
 
     /// The longest time that counts in a bucket, in ns; `None` for the last bucket, which has no
-    /// end. These are the buckets of the topic `latency/path`.
+    /// end. These are the buckets of the topic `latency/path`: the lines know no topics, so a test of
+    /// comm compares each.
     pub const fn upper_ns(bucket: usize) -> Option<u64> {
         match bucket {
             0 => Some(256),
@@ -326,7 +301,7 @@ impl Event {
                       pickup_refused, failed, way_blocked, stopped, resumed, mode, restarted, \
                       link_lost and link_back";
         Ok(Self {
-            kind: reader.word().read(wanted, EventKind::from_word)?,
+            kind: reader.word().read(wanted, Happened::from_word)?,
             node: Node::read(reader)?,
             order: read_or_dash(reader, number)?,
             product: read_or_dash(reader, ProductId::read)?,

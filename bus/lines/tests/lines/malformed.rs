@@ -65,7 +65,7 @@ fn no_label(column: usize, label: &str) -> String {
     )
 }
 
-const TWICE: &str = "product 7 is listed twice; every product needs a number of its own";
+const TWICE: &str = "goods 7 are listed twice; all goods need a number of their own";
 const BUCKET: &str = "a bucket from 0 to 89, above the one before it";
 const FRAMES: &str = "how many frames it holds, 1 to 999999";
 const END: &str = "the end of the line";

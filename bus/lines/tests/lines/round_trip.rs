@@ -3,7 +3,7 @@
 use lager_floor::{Grid, Heading, Node, Place, Product, ProductId, SideLength};
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Block, Degrees, Event, EventKind, Hello, Latency, Listed, Loads, Order, Queued, Report, Servos,
+    Block, Degrees, Event, Happened, Hello, Latency, Listed, Loads, Order, Queued, Report, Servos,
     State, Thinks, TruePose,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
@@ -223,7 +223,7 @@ prop_compose! {
 
 fn event() -> impl Strategy<Value = Report> {
     (
-        select(&EventKind::ALL),
+        select(Happened::all().collect::<Vec<_>>()),
         coord(),
         any::<Option<u32>>(),
         of(product_id()),

@@ -301,7 +301,7 @@ fn a_strangers_files_are_named() {
             ..BusConfig::of(&LAGER)
         };
         let said = open(&root).unwrap_err().to_string();
-        assert!(said.contains("sudo -u root lager"), "{said}");
+        assert!(said.contains("`sudo -u root`"), "{said}");
         return;
     }
     let said = open(&domain.config).unwrap_err().to_string();
@@ -311,5 +311,5 @@ fn a_strangers_files_are_named() {
     give(&folder, 12345).unwrap();
     let said = open(&domain.config).unwrap_err().to_string();
     give(&folder, 0).unwrap();
-    assert!(said.contains("sudo -u '#12345' lager"), "{said}");
+    assert!(said.contains("`sudo -u '#12345'`"), "{said}");
 }

@@ -231,9 +231,9 @@ fn a_changed_layout_is_refused_with_a_sentence() {
     let bridge = domain.open(Role::Bridge);
     let publisher = bridge.publisher::<SensorLine>().unwrap();
 
-    assert!(is_refused::<OtherType>(&domain).contains("another build of lager is running"));
-    assert!(is_refused::<OtherFields>(&domain).contains("another build of lager is running"));
-    assert!(is_refused::<OtherBuffer>(&domain).contains("another build of lager is running"));
+    assert!(is_refused::<OtherType>(&domain).contains("another build is running"));
+    assert!(is_refused::<OtherFields>(&domain).contains("another build is running"));
+    assert!(is_refused::<OtherBuffer>(&domain).contains("another build is running"));
 
     // Processes with the right layout are not disturbed.
     let mut logic = domain.open(Role::Logic).subscriber::<SensorLine>().unwrap();

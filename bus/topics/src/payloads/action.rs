@@ -47,6 +47,9 @@ coded! {
         WayBlocked = 16,
         /// Nothing stands on that way any more.
         WayOpened = 17,
+        /// In an earlier run of the robot, the goods of a product were not in their place; `order_id`
+        /// is the product's number.
+        GoodsGoneEarlier = 18,
     }
 }
 

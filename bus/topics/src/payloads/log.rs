@@ -140,7 +140,8 @@ coded! {
         GoodsBack = 59,
         /// All goods are in their places again.
         AllGoodsBack = 60,
-        /// A person has said that the goods are not in their place (`product`).
+        /// A person has said, or it is known of an earlier run, that the goods are not in their place
+        /// (`product`).
         GoodsGone = 61,
         /// The robot sounds its horn.
         Honks = 62,

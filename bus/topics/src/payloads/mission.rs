@@ -3,7 +3,7 @@
 use core::fmt;
 
 use lager_floor::{Heading, ProductId};
-use lager_orders::{Code, Reason};
+use lager_orders::{Code, EventKind, Reason};
 
 use super::failure::Failure;
 use lager_sample::{Tag, coded, payload};
@@ -42,8 +42,10 @@ coded! {
         PickedUp = 1,
         /// They were not found there.
         NotFound = 2,
-        /// A person has said so, or an earlier run of the robot has seen it.
+        /// A person has said so.
         Told = 3,
+        /// They were not there in an earlier run of the robot.
+        EarlierRun = 4,
     }
 }
 
@@ -153,28 +155,6 @@ impl fmt::Display for NotWaiting {
 }
 
 impl core::error::Error for NotWaiting {}
-
-coded! {
-    /// What happened on a mission (C8).
-    pub enum EventKind {
-        /// The robot stands at the goods.
-        InPosition = 0,
-        /// The robot is on its way to the goods.
-        GettingItem = 1,
-        /// The goods lie at the place of delivery.
-        ItemDelivered = 2,
-        /// The robot passed a node.
-        NextNode = 3,
-        /// The order cannot be carried out.
-        Refused = 4,
-        /// The goods are not felt in the claw, so the robot does not leave the pick station.
-        PickupRefused = 5,
-        /// The robot cannot go on with its work; `failure` says why and what would end it.
-        Failed = 6,
-        /// The robot has found the way from the node along `heading` blocked (L6).
-        WayBlocked = 7,
-    }
-}
 
 payload! {
     /// Something that happened on a mission.

@@ -20,13 +20,12 @@ mod truth;
 pub use action::{Input, InputKind};
 pub use failure::{Failure, FailureKind, Remedy};
 pub use inputs::{Beside, NavigatorInput, NavigatorInputKind, NavigatorInputs, Sent, TextKind};
+pub use lager_orders::EventKind;
 pub use latency::{CommandLatency, Durations, PathLatency};
 pub use link::{ArmProfileState, BoardHealth, CalibratedSensor, Calibration, Health};
 pub use log::{Joint, Thought, ThoughtKind};
 pub use map::{MapProduct, WarehouseMap};
-pub use mission::{
-    Event, EventKind, GoneGoods, GoneWhy, NotWaiting, Order, OrderQueue, WaitingOrder,
-};
+pub use mission::{Event, GoneGoods, GoneWhy, NotWaiting, Order, OrderQueue, WaitingOrder};
 pub use nav::{
     BlockSource, BlockedWay, BlockedWays, Goal, Hold, NavigatorStatus, Phase, Route, RouteNode,
     Step,

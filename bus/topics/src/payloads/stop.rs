@@ -3,6 +3,7 @@
 
 use core::fmt;
 
+use lager_orders::Reason;
 use lager_sample::{Tag, coded};
 
 use super::said;
@@ -27,8 +28,14 @@ coded! {
     }
 }
 
+impl From<StopCause> for Reason {
+    fn from(cause: StopCause) -> Self {
+        said::reason("stop_cause", Tag::from(cause))
+    }
+}
+
 impl fmt::Display for StopCause {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        said::reason("stop_cause", Tag::from(*self)).fmt(formatter)
+        Reason::from(*self).fmt(formatter)
     }
 }

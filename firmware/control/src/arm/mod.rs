@@ -36,6 +36,7 @@ mod squeeze;
 mod task;
 
 use lager_ax12::ErrorBits;
+use lager_wire::servo::{BASE, ELBOW, ROTATION, SHOULDER, WRIST};
 use lager_wire::{ArmCommand, ArmData, ArmLimits, ArmProfile};
 
 pub use config::ArmConfig;
@@ -49,19 +50,6 @@ use crate::time::{first, reached};
 
 /// How many servos the arm has; ids 1..=8, at index id - 1.
 pub const SERVOS: usize = ArmData::SERVOS as usize;
-
-/// Index of the base's servo.
-pub(crate) const BASE: usize = 0;
-/// Index of the shoulder's first servo.
-pub(crate) const SHOULDER: usize = 1;
-/// Index of the elbow's first servo.
-pub(crate) const ELBOW: usize = 3;
-/// Index of the wrist's servo.
-pub(crate) const WRIST: usize = 5;
-/// Index of the wrist rotation's servo.
-pub(crate) const ROTATION: usize = 6;
-/// Index of the gripper's servo.
-pub(crate) const GRIPPER: usize = 7;
 
 /// The servo that faces this one, if the joint has two.
 pub(crate) const fn partner(index: usize) -> Option<usize> {

@@ -17,13 +17,12 @@
 //! more steps than the gripper can go.
 
 use lager_ax12::table;
+use lager_wire::servo::{BASE, ELBOW, GRIPPER, ROTATION, SHOULDER, WRIST};
 use lager_wire::{ArmCommand, ArmPose};
 
 use super::servo::NEAR_GOAL;
 use super::task::{Freeze, GIVES_UP, Move, Program, Then};
-use super::{
-    Arm, BASE, ELBOW, GRIPPER, Job, ROTATION, SERVOS, SHOULDER, WRIST, bit, limits, partner,
-};
+use super::{Arm, Job, SERVOS, bit, limits, partner};
 use crate::time::reached;
 
 /// How a command of the arm ended.

@@ -9,8 +9,10 @@
 //! At the end the goal stays a little inside the thing; that makes the grip. A squeeze makes no
 //! more steps than the gripper can go, so it ends whatever the servo answers.
 
+use lager_wire::servo::GRIPPER;
+
 use super::task::{GIVES_UP, Program, Squeeze};
-use super::{Arm, GRIPPER, Job, bit};
+use super::{Arm, Job, bit};
 
 /// After this many steps without movement the gripper holds something (AMB-29).
 const STILL_STEPS: u8 = 4;

@@ -10,10 +10,10 @@ use core::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
+use lager_pty::PI_BUFFER;
+
 use crate::chip::{Chip, FREQUENCY, UsartId, sampled};
 
-/// At most so many bytes wait until the Pi reads them.
-const PI_BUFFER: usize = 4_096;
 /// Bits of a frame: 8N1.
 const FRAME: f64 = 10.0;
 

@@ -21,8 +21,8 @@ use core::cell::{Cell, Ref, RefCell, RefMut};
 use core::time::Duration;
 use std::rc::Rc;
 
-use lager_plant::arm::SERVOS;
-use lager_plant::noise::Noise;
+use lager_plant::arm::RESTING;
+use lager_plant::noise::{Noise, START_STREAM};
 use lager_plant::{Make, Snapshot, Warehouse, WarehouseError, World, WorldState};
 use thiserror::Error;
 
@@ -36,11 +36,6 @@ use line::PiLine;
 
 /// The voltage divider between the battery and the board's input.
 const BATTERY_DIVIDER: u32 = 4;
-/// The servos' first positions: the arm in its pose for driving, the claw open. An unpowered arm
-/// stays where somebody put it.
-const RESTING_ARM: [u16; SERVOS] = [512, 600, 423, 400, 623, 512, 512, 512];
-/// Number of the random sequence that sets the boards' start times.
-const START_STREAM: u64 = 100;
 /// The boards start at most this many cycles apart: 5 ms.
 const START_SPREAD: u64 = FREQUENCY / 200;
 
@@ -162,7 +157,7 @@ impl Rig {
         let mut delay = || spread.bits() % START_SPREAD;
         let sensor = Chip::new(&images.sensor, delay(), options.seed)?;
         let steering = Chip::new(&images.steering, delay(), !options.seed)?;
-        let world = World::new(&options.warehouse, options.seed, options.make, RESTING_ARM)?;
+        let world = World::new(&options.warehouse, options.seed, options.make, RESTING)?;
         let world = Rc::new(RefCell::new(world));
         let epoch = Rc::new(Epoch::default());
         let inputs = boards::connect_inputs(&sensor, &world, &epoch);

@@ -74,7 +74,8 @@ impl Service<'_> {
     fn obey(&mut self, stop: Stop) {
         self.page.heed(stop, Clock::monotonic_ns());
         self.core.stop(stop);
-        tracing::warn!("stopped {stop}; a resume releases it");
+        // `up` tells people of every stop that it sees on the bus.
+        tracing::info!("stopped {stop}; a resume releases it");
     }
 
     /// Releases this stop. A newer stop stays in force.

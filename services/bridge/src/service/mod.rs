@@ -27,7 +27,9 @@ use std::time::Duration;
 use heapless::spsc::{Consumer, Queue};
 use lager_home::Clock;
 use lager_orders::{Mode, Moment};
-use lager_ports::{Bus, Cause, PortError, Publisher, ReceiveError, Sample, Server, Subscriber};
+use lager_ports::{
+    Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, Sample, Server, Subscriber,
+};
 use lager_sample::Topic;
 use lager_stop::{StopError, StopPage};
 use lager_topics::{
@@ -48,9 +50,6 @@ use crate::serial::{PacketWriter, SerialPort};
 /// Longest wait for anything, in real time: a wake may be missed, and the shutdown flag is checked
 /// that often.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
-
-/// How long a new bridge waits for the state of the one before, in real time.
-const RESUME_WAIT: Duration = Duration::from_millis(500);
 
 /// How many presses of buttons can wait for the main loop.
 const TOUCHES: usize = 16;
@@ -91,7 +90,7 @@ pub fn run_with(
     shutdown: &Shutdown,
 ) -> Result<(), BridgeError> {
     let kept = if config.resume {
-        bus.kept::<LinkHealth>(RESUME_WAIT).unwrap_or_else(|error| {
+        bus.kept::<LinkHealth>(KEPT_WAIT).unwrap_or_else(|error| {
             // A state that cannot be read counts as lost, and the robot then starts stopped.
             tracing::error!("{error}");
             None

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use lager_floor::Node;
 use lager_lines::conversation::RobotLine;
-use lager_lines::extension::{EventKind, Report};
+use lager_lines::extension::{Happened, Report};
 use lager_orders::{Code, Moment, Reason};
 use lager_sample::Stamp;
 use lager_topics::{
@@ -160,13 +160,13 @@ impl Conversation {
         }
         self.lives.insert(service, since);
         if before.is_some() {
-            self.happened(now, EventKind::Restarted, service.as_str());
+            self.happened(now, Happened::Restarted, service.as_str());
         }
     }
 
     /// This process itself has started again.
     pub fn lives_again(&mut self, now: Moment) {
-        self.happened(now, EventKind::Restarted, Role::Comm.as_str());
+        self.happened(now, Happened::Restarted, Role::Comm.as_str());
     }
 
     /// Tells people the bridge's news: stops, and who may drive.
@@ -175,17 +175,17 @@ impl Conversation {
         let is_another = before.stopped_at_ns != health.stopped_at_ns;
         if health.stopped != 0 && (before.stopped == 0 || is_another) {
             self.known.stood = Stood::Awaited;
-            self.happened(now, EventKind::Stopped, &telling::stop_words(health));
+            self.happened(now, Happened::Stopped, &telling::stop_words(health));
         } else if before.stopped != 0 && health.stopped == 0 {
             self.known.stood = Stood::Unseen;
-            self.happened(now, EventKind::Resumed, "");
+            self.happened(now, Happened::Resumed, "");
         }
         if let Some(mode) = health.mode.get().filter(|_| before.mode != health.mode) {
-            self.happened(now, EventKind::Mode, mode.as_str());
+            self.happened(now, Happened::Mode, mode.as_str());
         }
     }
 
-    pub(super) fn happened(&mut self, now: Moment, kind: EventKind, text: &str) {
+    pub(super) fn happened(&mut self, now: Moment, kind: Happened, text: &str) {
         let report = telling::happened(kind, text, &self.known);
         self.remember(now, report);
     }

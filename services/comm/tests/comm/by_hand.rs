@@ -208,8 +208,7 @@ fn a_refusal_and_an_end_say_why() {
     robot.hears(&["styrcomm 3"]);
     let report = finished(&robot, Finish::NoTape);
     let said = robot.reports(&report);
-    let why =
-        "thought follow-forward was given up: the steering board has seen no tape for too long";
+    let why = "thought follow line was given up: the steering board has seen no tape for too long";
     assert_eq!(said, [why]);
     assert_eq!(robot.pass(200), [""; 0]);
 }

@@ -141,7 +141,7 @@ fn what_cannot_be_fetched_is_told_and_asked_for_again() {
     let mut robot = idle();
     assert_eq!(
         robot.hears(&["fetchprod 8"]),
-        ["thought there is no product 8"]
+        ["thought there are no goods 8"]
     );
     assert_eq!(robot.pass(200), ["fetchprod"]);
     robot.hears(&["fetchprod 12"]);
@@ -164,7 +164,7 @@ fn goods_outside_the_floor_are_told_and_everything_is_asked_again() {
     robot.hears(&["sidelength 40"]);
     robot.hears(&["karta 1 1 0 0"]);
     let said = robot.hears(&["prodlis 1 7 5 0 up"]);
-    assert!(said[0].starts_with("thought product 7 stands in the square (5, 0)"));
+    assert!(said[0].starts_with("thought goods 7 stand in the square (5, 0)"));
     assert_eq!(said.len(), 1);
     assert_eq!(robot.pass(200), ["sidelength"]);
 }

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::sync::LazyLock;
 
+use lager_wire::ArmProfile;
+
 use super::realtime::CoresSection;
 use super::section::{Declared, Section};
 use super::{
@@ -10,8 +12,7 @@ use super::{
     LogicSection, RealtimeSection, SerialSection, SimulatorSection, StationSection,
 };
 
-/// Every section, in the order of the file. `lager-wire` declares those of the arm, without
-/// explanations for people.
+/// Every section, in the order of the file.
 const SECTIONS: [Section; 18] = [
     Config::SECTION,
     LogSection::SECTION,
@@ -21,37 +22,13 @@ const SECTIONS: [Section; 18] = [
     SerialSection::SECTION,
     Section {
         name: "arm",
-        about: &[
-            " What the arm may do; the steering board is told at every start, and the arm stands until",
-            " the board has taken it. Positions are those of the servos, 0 to 1023, 0.29 degrees each;",
-            " torque and load are 1 to 1023 of full.",
-        ],
-        keys: &[
-            ("torque_limit", &[" Torque limit of all servos ..."]),
-            ("squeeze_load", &[" ... and load that ends a squeeze."]),
-            (
-                "gripper_open",
-                &[" Positions of the gripper when open, and when closed on nothing."],
-            ),
-            ("gripper_closed", &[]),
-        ],
+        about: ArmProfile::ABOUT,
+        keys: ArmProfile::KEYS,
     },
-    poses(
-        "arm.limits",
-        &[
-            " Where each joint may be sent, [lowest, highest]. A step that would lead outside is refused.",
-            " Of the shoulder and the elbow the first servo counts (2 and 4); the other one faces it.",
-        ],
-    ),
-    poses(
-        "arm.neutral",
-        &[" Where the arm goes when it has let go of goods, ..."],
-    ),
-    poses("arm.drop", &[" ... where it lets go, ..."]),
-    poses(
-        "arm.carry",
-        &[" ... and where it is while the robot drives with goods."],
-    ),
+    joints("arm.limits"),
+    joints("arm.neutral"),
+    joints("arm.drop"),
+    joints("arm.carry"),
     LogicSection::SECTION,
     SimulatorSection::SECTION,
     ChipSection::SECTION,
@@ -61,10 +38,13 @@ const SECTIONS: [Section; 18] = [
     GatewaySection::SECTION,
 ];
 
-/// A section of joints. Their names explain them.
-const fn poses(name: &'static str, about: &'static [&'static str]) -> Section {
-    let keys = &[];
-    Section { name, about, keys }
+/// A section of joints, whose names explain them. The key of the profile explains the section.
+const fn joints(name: &'static str) -> Section {
+    Section {
+        name,
+        about: &[],
+        keys: &[],
+    }
 }
 
 /// What a key means, in the words of the printed file.
@@ -103,16 +83,19 @@ impl Config {
             if !name.is_empty() {
                 text.push('\n');
                 explain(&mut text, about);
+                explain(&mut text, of_its_key(name));
                 // Writing to a String cannot fail.
                 let _ = writeln!(text, "[{name}]");
             }
             for (key, explained) in keys {
+                // What a section within this one holds stands below.
+                if SECTIONS.iter().any(|it| is_within(it.name, name, key)) {
+                    continue;
+                }
                 explain(&mut text, explained);
                 let is_it = |line: &&str| line.split(" = ").next() == Some(key);
                 let _ = match set.iter().position(is_it) {
                     Some(place) => writeln!(text, "{}", set.remove(place)),
-                    // A blank line stands before a section.
-                    None if SECTIONS.iter().any(|it| is_within(it.name, name, key)) => Ok(()),
                     None => writeln!(text, "# {key} = ..."),
                 };
             }
@@ -122,6 +105,15 @@ impl Config {
         }
         text
     }
+}
+
+/// The explanation of the key that holds this section within another one.
+fn of_its_key(section: &str) -> &'static [&'static str] {
+    let keys = SECTIONS
+        .iter()
+        .flat_map(|of| of.keys.iter().map(|key| (of.name, key)));
+    let mut holding = keys.filter(|(of, (key, _))| is_within(section, of, key));
+    holding.next().map_or(&[], |(_, (_, explained))| *explained)
 }
 
 /// Whether `section` is a subsection that holds this key of another section.
@@ -161,7 +153,7 @@ mod tests {
     use super::super::{Body, Waiting};
     use super::*;
     use lager_comm::LinkLost;
-    use lager_wire::{ArmLimits, ArmProfile, JointLimits};
+    use lager_wire::{ArmLimits, JointLimits};
 
     #[test]
     fn the_documented_file_reads_back_with_every_key() {
@@ -213,6 +205,7 @@ mod tests {
                 gag: Some("/run/gag".into()),
                 warehouse: Some("/srv/hall.toml".into()),
                 queue: Some("/srv/queue.toml".into()),
+                history: false,
                 panel: Some("127.0.0.1:7411".parse().expect("an address")),
             },
             comm: CommSection {

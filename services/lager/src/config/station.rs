@@ -28,6 +28,9 @@ section! {
         pub warehouse: Option<PathBuf> = None,
         /// The file in which it keeps the orders that wait. Unset, queue.toml in the state folder.
         pub queue: Option<PathBuf> = None,
+        /// Whether it keeps the last day of the robot's states and events, 192 MiB at most, in the
+        /// folder history in the state folder.
+        pub history: bool = true,
         /// Where its operator panel answers browsers of this machine. Unset, 127.0.0.1:7410, or
         /// another port if that one is taken.
         #[serde(deserialize_with = "in_config")]

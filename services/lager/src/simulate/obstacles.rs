@@ -54,7 +54,7 @@ fn goods_without_a_way_are_unreachable_and_the_failure_says_what_would_end_it() 
     let closed = with_obstacles("small", &[edge.ends()]);
     let mut whole = whole(&closed, &[product.id], 1, 0);
     let why = whole.run(LIMIT).expect("a failure");
-    assert!(why.contains("I cannot get from"), "{why}");
+    assert!(why.contains("the robot cannot get from"), "{why}");
     let failure = whole.navigator.status().failure;
     assert_eq!(failure.kind, FailureKind::Unreachable);
     assert_eq!(failure.remedy, Remedy::Way);

@@ -8,10 +8,11 @@
 //! ```
 
 use lager_topics::{FailureKind, Finish};
+use lager_wire::servo::{BASE, ELBOW, SHOULDER};
 use lager_wire::{ArmCommand, Command};
 
 use super::helm::{Helm, Pause, STANDBY};
-use crate::arm::{ArmSeen, BASE, ELBOW, SHOULDER};
+use crate::arm::ArmSeen;
 use crate::ending::Ending;
 
 /// A joint has arrived when no further step would bring it nearer.

@@ -60,10 +60,11 @@ impl Mission {
         out.queue_changed = true;
     }
 
-    /// Somebody says that these goods are not in their place. Waiting orders for them are refused.
-    /// If the robot is on its way already, it goes on and sees for itself.
-    pub(crate) fn miss_goods(&mut self, product: i32, out: &mut Output) {
-        self.gone.add(product, GoneWhy::Told, self.now);
+    /// A person, or what was kept of an earlier run, says that these goods are not in their place.
+    /// Waiting orders for them are refused. If the robot is on its way already, it goes on and sees
+    /// for itself.
+    pub(crate) fn miss_goods(&mut self, product: i32, why: GoneWhy, out: &mut Output) {
+        self.gone.add(product, why, self.now);
         out.queue_changed = true;
         think_of_product(ThoughtKind::GoodsGone, product, out);
         let mut waiting = self.queue.waiting().iter().map(|waiting| waiting.order);

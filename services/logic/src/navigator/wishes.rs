@@ -5,7 +5,9 @@ use core::time::Duration;
 
 use lager_floor::{Heading, Node};
 use lager_orders::{Mode, Pick};
-use lager_topics::{BlockSource, FailureKind, Goal, InputKind, Phase, ThoughtKind, WarehouseMap};
+use lager_topics::{
+    BlockSource, FailureKind, Goal, GoneWhy, InputKind, Phase, ThoughtKind, WarehouseMap,
+};
 
 use super::{Input, Navigator};
 use crate::blocks::Block;
@@ -63,8 +65,14 @@ impl Navigator {
             InputKind::OrderCancelled => self.mission.cancel(id, out),
             InputKind::OrderMovedUp => self.mission.move_up(id, out),
             InputKind::QueueCleared => self.mission.clear_queue(out),
-            InputKind::GoodsGone => match goods(id) {
-                Some(product) => self.mission.miss_goods(product, out),
+            InputKind::GoodsGone | InputKind::GoodsGoneEarlier => match goods(id) {
+                Some(product) => {
+                    let why = match kind {
+                        InputKind::GoodsGone => GoneWhy::Told,
+                        _ => GoneWhy::EarlierRun,
+                    };
+                    self.mission.miss_goods(product, why, out);
+                }
                 None => return,
             },
             InputKind::GoodsBack => self.mission.find_goods(goods(id), out),

@@ -56,7 +56,7 @@ fn delivered_goods_are_not_fetched_again_until_they_are_back() {
     assert_eq!(refused(&trial), [2], "{}", trial.story());
     let said = trial.thoughts.last().unwrap();
     assert!(
-        said.starts_with("I cannot fetch product 1: product 1 was delivered "),
+        said.starts_with("I cannot fetch goods 1: goods 1 were delivered "),
         "{said}"
     );
     assert!(
@@ -90,7 +90,7 @@ fn what_waits_or_is_under_way_is_not_ordered_twice() {
     trial.order(4, 2);
     assert_eq!(refused(&trial), [2, 4], "waiting");
     let said = trial.thoughts.last().unwrap();
-    assert!(said.contains("product 2 is ordered already"), "{said}");
+    assert!(said.contains("goods 2 are ordered already"), "{said}");
     // After a cancelled order the product can be ordered again.
     trial.press(InputKind::OrderCancelled, 3);
     trial.order(5, 2);
@@ -142,6 +142,8 @@ fn a_waiting_order_for_goods_that_are_told_to_be_gone_is_refused() {
     assert_eq!(refused(&trial), [2]);
     assert_eq!(trial.queue.orders().len(), 0);
     assert_eq!(gone(&trial), [(2, Some(GoneWhy::Told))]);
+    trial.press(InputKind::GoodsGoneEarlier, 2);
+    assert_eq!(gone(&trial), [(2, Some(GoneWhy::EarlierRun))]);
     trial.deliver(1);
 }
 

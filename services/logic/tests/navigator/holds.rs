@@ -115,7 +115,11 @@ fn who_was_restarted_and_knows_no_place_waits_for_a_reset() {
     trial.navigator = Navigator::lost(LogicConfig::default());
     trial.tell(Input::Map(&map));
     trial.tell_mode();
-    assert!(said(&trial, "nobody kept where I was"), "{}", trial.story());
+    assert!(
+        said(&trial, "nobody kept where it was"),
+        "{}",
+        trial.story()
+    );
     trial.order(2, 1);
     let last = trial.events.last().map(|event| (event.0, event.1));
     assert_eq!(last, Some((EventKind::Refused, 2)));

@@ -114,7 +114,7 @@ fn a_full_queue_refuses_and_says_how_many_wait() {
     assert!(said.contains("31 orders are waiting already"), "{said}");
     trial.order(98, 77);
     let said = trial.thoughts.last().unwrap();
-    assert!(said.contains("product 77"), "{said}");
+    assert!(said.contains("goods 77"), "{said}");
 }
 
 #[test]
@@ -229,7 +229,7 @@ fn the_order_under_way_is_taken_back_at_any_moment_before_its_goods_are_held() {
     trial.press(InputKind::OrderCancelled, 1);
     assert_eq!(trial.queue.under_way, 1);
     let said = trial.thoughts.last().unwrap();
-    assert!(said.contains("I bring product 1 all the same"), "{said}");
+    assert!(said.contains("I bring goods 1 all the same"), "{said}");
     trial.deliver(1);
     assert_eq!(orders(&trial, EventKind::ItemDelivered), [1]);
 }

@@ -87,7 +87,7 @@ fn a_page_is_told_that_the_disk_does_not_take_its_warehouse() {
     // Nothing can be written under the name of a folder, whoever asks.
     let in_the_way = folder.join("warehouse.toml.new");
     std::fs::create_dir_all(&in_the_way).unwrap();
-    let panel = Running::of(server(Some(file.clone())));
+    let panel = Running::of(server(Some(file.clone()), None));
     let mut page = panel.own_page();
     page.say(r#"warehouse 1 {"size":[2,3],"side_length_cm":40}"#);
     let answer = page.line("answer 1").unwrap();

@@ -1,6 +1,7 @@
 //! Who gets in: real sockets, a real station, and people with other addresses, names and tokens.
 
 mod bounds;
+mod history;
 mod scene;
 mod stop;
 mod wheel;
@@ -83,7 +84,7 @@ fn on_this_machine_too_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
     let (host, tokens) = (panel.host(), panel.tokens.clone());
     let answer = panel.ask("/", &[("Host", &host)]);
     assert_eq!(status(&answer), 403);
-    for part in ["`lager up`", "skrivit ut"] {
+    for part in ["printed when", "skrev ut"] {
         assert!(answer.contains(part), "{part}: {answer}");
     }
     assert_eq!(status(&panel.ask("/?token=0", &[("Host", &host)])), 403);

@@ -30,13 +30,14 @@ pub(crate) struct Running {
     threads: Vec<JoinHandle<()>>,
 }
 
-pub(crate) fn server(warehouse: Option<PathBuf>) -> Server {
+pub(crate) fn server(warehouse: Option<PathBuf>, history: Option<PathBuf>) -> Server {
     Server::open(ServerConfig {
         name: Name::new("station").unwrap(),
         listen: Listen::At(SocketAddr::from(([127, 0, 0, 1], 0))),
         secrets: Secrets::default(),
         gag: None,
         queues: warehouse.as_deref().map(lager_station::Queues::beside),
+        history,
         warehouse,
         otherwise: None,
         fetch: Vec::new(),
@@ -46,7 +47,7 @@ pub(crate) fn server(warehouse: Option<PathBuf>) -> Server {
 
 impl Running {
     pub(crate) fn new() -> Self {
-        Self::of(server(None))
+        Self::of(server(None, None))
     }
 
     pub(crate) fn of(server: Server) -> Self {

@@ -76,7 +76,7 @@ fn what_moves_a_robot_or_how_it_drives_is_its_drivers_while_there_is_one() {
         bo.say(&format!("do r1 {number} {number}000 {action}"));
         let answer = bo.line(&format!("answer {number}")).unwrap();
         assert!(
-            answer.contains("drives the robot; ask him"),
+            answer.contains("drives the robot; ask first"),
             "{action}: {answer}"
         );
     }

@@ -281,7 +281,7 @@ fn each_product_waits_once_and_is_taken_out() {
     assert_eq!(say(&mut robot, "fetchprod"), "fetchprod 12");
     assert_eq!(
         robot.fetch(product(12)).unwrap_err().to_string(),
-        "product 12 is ordered already"
+        "goods 12 are ordered already"
     );
     assert_eq!(say(&mut robot, "fetchprod"), "fetchprod 7");
     assert_eq!(robot.fetch(product(7)), Err(twice));

@@ -144,33 +144,33 @@ fn a_warehouse_that_cannot_be_is_refused_in_a_sentence() {
         (
             "id = 7",
             "id = -7",
-            "product -7 has a negative number; numbers start at 0",
+            "goods -7 have a negative number; numbers start at 0",
         ),
         (
             "id = 7",
             "id = 12",
-            "product 12 is listed twice; every product needs a number of its own",
+            "goods 12 are listed twice; all goods need a number of their own",
         ),
         (
             "[1, 0]",
             "[4, 0]",
-            "product 7 stands in the square (4, 0), but the last one is (3, 2)",
+            "goods 7 stand in the square (4, 0), but the last one is (3, 2)",
         ),
         (
             "id = 12",
             "id = 12\nname = \"screws\"",
-            "two products are named screws; give each product a name of its own",
+            "two goods are named screws; give all goods a name of their own",
         ),
         (
             "\"screws\"",
             "\"12\"",
-            "a product is named 12, which people would take for its number; use a letter",
+            "goods are named 12, which people would take for their number; use a letter",
         ),
         (
             "\"screws\"",
             "\"screws, M4\"",
-            "a product is named screws, M4, which cannot stand for a product: a name has a letter and \
-             neither comma, semicolon, line break nor a blank at its ends",
+            "goods are named screws, M4, which cannot stand for goods: a name has a letter and neither \
+             comma, semicolon, line break nor a blank at its ends",
         ),
     ] {
         assert_eq!(change(from, to), sentence);
@@ -186,8 +186,8 @@ fn more_products_than_fit_in_a_line_are_refused() {
         .collect();
     assert_eq!(
         told(&many).expect_err("too many").to_string(),
-        "the warehouse has 100 products, which do not fit in one line of the robot's language; \
-         list fewer"
+        "the warehouse has more goods than fit in one line of the robot's language: 100; list \
+         fewer"
     );
 }
 

@@ -127,7 +127,7 @@ fn goods_outside_the_map_are_refused_and_the_warehouse_stays() {
     station.heard(Peer::Gag, Ok("prodlis 1 3 9 0 up"));
     let answer = said(&mut station);
     assert!(
-        answer[0].contains("stands in the square (9, 0)"),
+        answer[0].contains("stand in the square (9, 0)"),
         "{answer:?}"
     );
     assert_eq!(answer[1], "gag: prodlis");

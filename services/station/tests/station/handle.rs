@@ -153,10 +153,10 @@ fn goods_that_a_robot_has_seen_to_be_gone_are_not_ordered_from_it() {
     let why = |refused: Result<(), WishRefused>| refused.expect_err("it is refused").to_string();
     assert_eq!(
         why(fetch(7)),
-        "product 7 is not in its place, as robot r1 has seen; put it back and say \
-         that it is there"
+        "goods 7 are not in their place, as robot r1 has seen; put them back and \
+         say that they are there"
     );
-    assert_eq!(why(fetch(12)), "product 12 is ordered already");
+    assert_eq!(why(fetch(12)), "goods 12 are ordered already");
     robot.says(b"gone 0\nstate product=12\n");
     wait_for(handle, |view| {
         let gone = view.shown.gone.as_ref()?;

@@ -7,6 +7,7 @@ mod extended;
 mod file;
 mod gag;
 mod handle;
+mod history;
 mod late;
 mod links;
 mod sockets;

@@ -108,6 +108,7 @@ fn config(folder: &std::path::Path) -> ServerConfig {
         warehouse: Some(folder.join("warehouse.toml")),
         otherwise: None,
         queues: Some(folder.join("warehouse.toml.queue")),
+        history: None,
         fetch: Vec::new(),
     }
 }

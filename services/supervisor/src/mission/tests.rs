@@ -17,7 +17,7 @@ fn seen(phase: Phase, status: NavigatorStatus) -> Seen {
             ..status
         }),
         queue: Some(OrderQueue::default()),
-        refused: None,
+        ..Seen::default()
     }
 }
 

@@ -87,7 +87,7 @@ fn what_the_bridge_answers_is_handed_on() {
     robot.health.calibrated_sensors = 9;
     let said = robot.told();
     assert!(
-        said[0].starts_with("refused 3 only 9 of the 11"),
+        said[0].starts_with("refused 3 line sensors that have seen both floor and tape: 9 of 11"),
         "{said:?}"
     );
 }

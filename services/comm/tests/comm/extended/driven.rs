@@ -113,8 +113,7 @@ fn nothing_undoes_a_stop_that_comes_with_it_or_after_it() {
     robot
         .conversation
         .answered_by_bridge(id, done(Outcome::Refused));
-    let why =
-        "refused 4 a newer stop is set, by a `lager` command: it was ordered; look at the robot";
+    let why = "refused 4 a newer stop is set (it was ordered); look at the robot";
     let said = robot.done();
     assert!(said[0].starts_with(why), "{said:?}");
     // What names another one than is in force is not even asked.

@@ -30,7 +30,7 @@ fn an_order_is_done_when_logic_has_it() {
         failure: Failure::new(FailureKind::UnknownProduct, (0, 0), 0, 8),
         ..Event::default()
     });
-    let why = "product 8 is not on my map";
+    let why = "goods 8 are not on the map";
     assert_eq!(
         said,
         [

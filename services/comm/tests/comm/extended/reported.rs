@@ -206,7 +206,7 @@ fn events_are_told_with_their_reason() {
     });
     assert_eq!(
         said,
-        ["event failed 3 1 4 7 I have been driven by hand, 30 mm"]
+        ["event failed 3 1 4 7 the robot has been driven by hand, 30 mm"]
     );
 }
 
@@ -223,7 +223,7 @@ fn a_thought_is_told_in_values_before_it_is_told_in_words() {
             "thinks kind=order_refused node=0,0 looks=left joint=base sides=0 product=9 expected=0 \
              seen=0 failure=unknown_product failure_node=3,1 failure_expected=0 failure_seen=9 \
              remedy=map",
-            "thought I cannot fetch product 9: product 9 is not on my map.",
+            "thought I cannot fetch goods 9: goods 9 are not on the map.",
         ]
     );
     // The document has words only.
@@ -277,6 +277,7 @@ fn how_soon_both_wheels_stood_is_told_where_it_was_seen() {
     };
     let report = |left_duty| SteeringReport {
         left_duty,
+        age_ms: 0,
         ..SteeringReport::default()
     };
     let stop = |robot: &mut Robot| {

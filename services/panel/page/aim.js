@@ -1,0 +1,171 @@
+// The hand on the map. A pointer, a finger or the keys pan and zoom it, and mean a thing on it: the tip says what that
+// is and what a click or Enter does there. The same words stand for all of them (offers.js), so no tip is wrong.
+
+import { meant, nearest, nextTo } from "./grid.js";
+import { meets } from "./labels.js";
+import { put, say } from "./words.js";
+
+/** A press that moves further than this, in pixels, moves the map and means nothing. */
+const STILL_PX = 5;
+/** Two clicks on a thing within this time are one, in ms. */
+const TWICE_MS = 400;
+/** How far the tip stays from what it is about, in pixels. */
+const OFF_PX = 16;
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+export class Aim {
+  /** `offers` says what a thing is and does; `isArmed`, whether the arrows drive. */
+  constructor(map, { tip, offers, isArmed }) {
+    Object.assign(this, { map, tip, offers, isArmed });
+    /** What pointer and keys mean now. */
+    this.pointed = null;
+    this.chosen = null;
+    this.clicked = { id: null, at: -Infinity };
+    this.gestures(map.svg);
+    map.svg.addEventListener("keydown", (event) => this.key(event));
+    map.svg.addEventListener("focus", () => this.draw());
+    map.svg.addEventListener("blur", () => this.draw());
+  }
+
+  /** Drag to pan, wheel or two fingers to zoom; a click acts. */
+  gestures(svg) {
+    let from = null;
+    let moved = 0;
+    const { map } = this;
+    const fingers = new Map();
+    const apart = () => {
+      const [a, b] = [...fingers.values()];
+      return { far: Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY), clientX: (a.clientX + b.clientX) / 2, clientY: (a.clientY + b.clientY) / 2 };
+    };
+    svg.addEventListener("pointerdown", (event) => {
+      fingers.set(event.pointerId, event);
+      from = map.point(event);
+      // A second finger zooms, so the first one meets nothing.
+      moved = fingers.size > 1 ? Infinity : 0;
+      svg.setPointerCapture(event.pointerId);
+    });
+    svg.addEventListener("pointermove", (event) => {
+      if (!from) return this.point(event.pointerType === "touch" ? null : this.at(event));
+      if (fingers.size === 2 && fingers.has(event.pointerId)) {
+        const before = apart().far;
+        fingers.set(event.pointerId, event);
+        const now = apart();
+        if (before > 0 && now.far > 0) map.zoom(before / now.far, map.point(now));
+        return;
+      }
+      const [x, y] = map.point(event);
+      moved += Math.hypot(event.movementX, event.movementY);
+      if (moved < STILL_PX) return;
+      this.point(null);
+      map.shift(from[0] - x, from[1] - y);
+    });
+    svg.addEventListener("pointerup", (event) => {
+      fingers.delete(event.pointerId);
+      if (from && moved < STILL_PX) this.click(this.at(event), event.timeStamp);
+      from = null;
+    });
+    svg.addEventListener("pointercancel", (event) => {
+      fingers.delete(event.pointerId);
+      from = null;
+    });
+    svg.addEventListener("pointerleave", () => this.point(null));
+    svg.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      map.zoom(event.deltaY > 0 ? 1.1 : 0.9, map.point(event));
+    }, { passive: false });
+  }
+
+  at(event) {
+    const [x, y] = this.map.point(event);
+    return meant([x, -y], this.map.scene);
+  }
+
+  point(target) {
+    if (this.pointed?.id === target?.id && this.pointed?.kind === target?.kind) return;
+    this.pointed = target;
+    this.draw();
+  }
+
+  click(target, time) {
+    const id = target ? `${target.kind} ${target.id}` : "";
+    if (this.clicked.id === id && time - this.clicked.at < TWICE_MS) return;
+    // One that did nothing leaves the next one free.
+    this.clicked = { id: this.act(target) ? id : null, at: time };
+  }
+
+  /** Does what is offered, or says why nothing is; whether it did. */
+  act(target) {
+    const { act, why } = this.offers(target);
+    if (act) act();
+    else this.map.tell(why ?? "");
+    this.draw();
+    return Boolean(act);
+  }
+
+  /** Keys of the map itself, while the arrows do not drive. */
+  key(event) {
+    if (event.defaultPrevented || event.ctrlKey || event.altKey || event.metaKey) return;
+    const { map } = this;
+    const arrow = ARROWS[event.key];
+    if (arrow && this.isArmed()) return;
+    if (arrow && event.shiftKey) map.shift((arrow[0] * map.view[2]) / 10, (-arrow[1] * map.view[3]) / 10);
+    else if (arrow) this.step(arrow);
+    else if (event.key === "+") map.zoom(0.8);
+    else if (event.key === "-") map.zoom(1.25);
+    else if (event.key === "Enter" && !event.repeat) this.act(this.current());
+    else return;
+    event.preventDefault();
+  }
+
+  /** What the keys mean: what was chosen last, at first what is nearest to the middle of the view. */
+  current() {
+    const { scene, view: [x, y, width, height] } = this.map;
+    if (!scene.warehouse) return null;
+    // The squares' sides are meant only while goods are placed.
+    if (!this.chosen || (this.chosen.kind === "square") !== scene.isPlacing) this.chosen = nearest([x + width / 2, -y - height / 2], scene);
+    return this.chosen;
+  }
+
+  step(arrow) {
+    const before = this.current();
+    if (!before) return;
+    this.chosen = nextTo(before.at, arrow, this.map.scene) ?? before;
+    this.pointed = null;
+    this.map.reveal(this.chosen.at);
+    this.draw();
+  }
+
+  /** Another warehouse has other things. */
+  forget() {
+    this.pointed = this.chosen = null;
+  }
+
+  /** The tip at what is meant: by the pointer or, while the map has the keys' focus, by them. */
+  draw() {
+    const { svg } = this.map;
+    const hasKeys = svg.matches(":focus-visible");
+    const target = this.pointed ?? (hasKeys ? this.current() : null);
+    this.map.drawCross(hasKeys ? this.current()?.at : null);
+    const { what, does, why } = target ? this.offers(target) : {};
+    this.tip.hidden = !what;
+    if (!what) return;
+    const [name, act] = this.tip.children;
+    put(name, what);
+    put(act, does ? say(this.pointed ? "tip_click" : "tip_enter", does) : why ?? "");
+    this.place(this.map.pixels(target.at), this.map.robotPixels());
+  }
+
+  /** Above what it is about, or where it covers no robot. */
+  place([x, y], robot) {
+    const { offsetWidth: wide, offsetHeight: high } = this.tip;
+    const { clientWidth: width, clientHeight: height } = this.map.svg.parentElement;
+    const fit = (left, top) => [Math.max(4, Math.min(width - wide - 4, left)), Math.max(4, Math.min(height - high - 4, top))];
+    const places = [fit(x - wide / 2, y - OFF_PX - high), fit(x - wide / 2, y + OFF_PX), fit(x + OFF_PX, y - high / 2), fit(x - OFF_PX - wide, y - high / 2), [4, 4]];
+    const isFree = ([left, top]) => {
+      const box = [left, top, left + wide, top + high];
+      return !meets(box, [x - 8, y - 8, x + 8, y + 8]) && !(robot && meets(box, robot));
+    };
+    const [left, top] = places.find(isFree) ?? places[0];
+    Object.assign(this.tip.style, { left: `${Math.round(left)}px`, top: `${Math.round(top)}px` });
+  }
+}

@@ -1,0 +1,99 @@
+// The grid of a warehouse: its sides, and the things on it that a pointer or a key can mean.
+
+/** The steps to the four sides of a square, with y upwards. */
+export const SIDES = { left: [-1, 0], up: [0, 1], right: [1, 0], down: [0, -1] };
+
+/** How near a point means a crossing or a way: as a part of a square's side, and in pixels at least. */
+const NEAR = 0.15;
+const NEAR_PX = 8;
+/** How far from its middle the side of a square is meant by keys, as a part of the square's side. */
+const ASIDE = 0.3;
+
+/** Column, row and side of a way from its words, `x y side`, and its middle in mm. */
+export function way(words, side) {
+  const [x, y, to] = words.split(" ");
+  const [dx, dy] = SIDES[to] ?? [0, 0];
+  return { x: Number(x), y: Number(y), to, dx, dy, middle: [(Number(x) + dx / 2) * side, (Number(y) + dy / 2) * side] };
+}
+
+/** The two crossings of a way as `x,y`, from its words. */
+export function ends(words) {
+  const { x, y, dx, dy } = way(words, 1);
+  return [`${x},${y}`, `${x + dx},${y + dy}`];
+}
+
+/** The words of the same way from its end that is further left or lower. */
+export function oneName(words) {
+  const { x, y, to, dx, dy } = way(words, 1);
+  return { left: `${x + dx} ${y} right`, down: `${x} ${y + dy} up` }[to] ?? words;
+}
+
+/** The side of its square that a point is nearest to. */
+function nearestSide(x, y) {
+  const ways = { left: x, right: 1 - x, down: y, up: 1 - y };
+  return Object.keys(ways).reduce((best, side) => (ways[side] < ways[best] ? side : best));
+}
+
+const crossing = (x, y, side) => ({ kind: "crossing", id: `${x},${y}`, at: [x * side, y * side] });
+const wayAt = (words, side) => ({ kind: "way", id: words, at: way(words, side).middle });
+const good = ({ id, x, y }) => ({ kind: "good", id, at: [x, y] });
+
+function square(x, y, from, side) {
+  const [dx, dy] = SIDES[from];
+  return { kind: "square", id: `${x} ${y} ${from}`, square: [x, y], side: from, at: [(x + 0.5 + dx * ASIDE) * side, (y + 0.5 + dy * ASIDE) * side] };
+}
+
+/** What a point in mm means: goods, a crossing or a way; while goods are placed, the side of a square; or null. */
+export function meant([px, py], { warehouse, side, scale, parcels, isPlacing }) {
+  if (!warehouse) return null;
+  const [width, height] = warehouse.size;
+  const [gx, gy] = [px / side, py / side];
+  if (isPlacing) {
+    const [x, y] = [Math.floor(gx), Math.floor(gy)];
+    return x < 0 || y < 0 || x >= width || y >= height ? null : square(x, y, nearestSide(gx - x, gy - y), side);
+  }
+  const hit = parcels.find(({ x, y, size }) => Math.max(Math.abs(px - x), Math.abs(py - y)) <= size / 2);
+  if (hit) return good(hit);
+  const near = Math.min(0.3, Math.max(NEAR, (NEAR_PX * scale) / side));
+  const [nx, ny] = [Math.round(gx), Math.round(gy)];
+  const [isColumn, isRow] = [Math.abs(gx - nx) < near, Math.abs(gy - ny) < near];
+  if (nx < 0 || ny < 0 || nx > width || ny > height) return null;
+  if (isColumn && isRow) return crossing(nx, ny, side);
+  if (isRow && gx > 0 && gx < width) return wayAt(`${Math.floor(gx)} ${ny} right`, side);
+  if (isColumn && gy > 0 && gy < height) return wayAt(`${nx} ${Math.floor(gy)} up`, side);
+  return null;
+}
+
+/** Everything that keys can reach. */
+function all({ warehouse: { size: [width, height] }, side, parcels, isPlacing }) {
+  const found = isPlacing ? [] : parcels.map(good);
+  for (let x = 0; x <= width; x++) {
+    for (let y = 0; y <= height; y++) {
+      if (isPlacing) {
+        if (x < width && y < height) for (const from of Object.keys(SIDES)) found.push(square(x, y, from, side));
+        continue;
+      }
+      found.push(crossing(x, y, side));
+      if (x < width) found.push(wayAt(`${x} ${y} right`, side));
+      if (y < height) found.push(wayAt(`${x} ${y} up`, side));
+    }
+  }
+  return found;
+}
+
+/** The thing that is next from a point in mm in a direction; what lies aside counts as further. Null if there is none. */
+export function nextTo([px, py], [dx, dy], scene) {
+  let best = { target: null, far: Infinity };
+  for (const target of all(scene)) {
+    const [x, y] = [target.at[0] - px, target.at[1] - py];
+    const [along, across] = [x * dx + y * dy, Math.abs(x * dy - y * dx)];
+    if (along > 1 && across <= along && along + 2 * across < best.far) best = { target, far: along + 2 * across };
+  }
+  return best.target;
+}
+
+/** The thing that is nearest to a point in mm. */
+export function nearest([px, py], scene) {
+  const far = ({ at: [x, y] }) => Math.hypot(x - px, y - py);
+  return all(scene).reduce((best, one) => (far(one) < far(best) ? one : best));
+}

@@ -1,0 +1,74 @@
+// Tells a person who looks elsewhere that a robot needs him: in the title of the page, and if he has asked for it
+// by a message of the browser and by a sound. Browsers show messages only for a page of this machine or over TLS.
+
+import { face } from "./face.js";
+
+/** The looks that only a person ends. */
+const NEEDS = ["board", "lost", "needs"];
+/** What has passed within this time is not told, in ms. */
+const PASSES_MS = 2_000;
+/** The sound: its pitch in Hz and its length in s. */
+const [PITCH, LENGTH] = [660, 0.3];
+
+export class Notify {
+  constructor(link, box) {
+    Object.assign(this, { link, box, title: document.title, audio: null });
+    /** Since when each robot has needed somebody, by its name, and whether that has been told. */
+    this.needing = new Map();
+    box.checked = localStorage.getItem("notify") === "yes";
+    box.addEventListener("change", () => this.choose());
+    // A page may sound only once somebody has pressed something on it.
+    addEventListener("pointerdown", () => box.checked && this.wake());
+  }
+
+  choose() {
+    localStorage.setItem("notify", this.box.checked ? "yes" : "no");
+    if (!this.box.checked) return;
+    this.wake();
+    globalThis.Notification?.requestPermission();
+  }
+
+  wake() {
+    this.audio ??= new AudioContext();
+    this.audio.resume();
+  }
+
+  draw(now) {
+    const all = [...this.link.robots.values()].map((robot) => ({ robot, ...face(this.link, robot, now) }));
+    const needy = all.filter(isNeedy);
+    const title = needy.map(({ robot, said }) => `${robot.name}: ${said}`).join("; ");
+    document.title = title ? `! ${title}` : this.title;
+    const before = this.needing;
+    this.needing = new Map(needy.map(({ robot: { name } }) => [name, before.get(name) ?? { since: now, isTold: false }]));
+    for (const { robot, said, more } of needy) {
+      const need = this.needing.get(robot.name);
+      if (need.isTold || now - need.since < PASSES_MS) continue;
+      need.isTold = true;
+      if (this.box.checked) this.tell(robot.name, [said, more].filter(Boolean).join(". "));
+    }
+  }
+
+  tell(name, body) {
+    this.sound();
+    if (globalThis.Notification?.permission !== "granted") return;
+    try {
+      new Notification(name, { body, tag: name });
+    } catch {
+      // On some phones only a worker may; the sound has told it.
+    }
+  }
+
+  sound() {
+    if (this.audio?.state !== "running") return;
+    const tone = new OscillatorNode(this.audio, { frequency: PITCH });
+    tone.connect(this.audio.destination);
+    tone.start();
+    tone.stop(this.audio.currentTime + LENGTH);
+  }
+}
+
+/** Whether a robot waits for a person: to end what is wrong, or to pick goods up. */
+function isNeedy({ look, robot: { state } }) {
+  const isStoppedAlone = look === "stopped" && state.stop_cause !== undefined && state.stop_cause !== "ordered";
+  return NEEDS.includes(look) || isStoppedAlone || (look === "waits" && state.phase === "picking" && state.pick === "manual");
+}

@@ -1,0 +1,96 @@
+// What is on the ways of the map: the trail, the route with the next crossing, obstacles and ways found blocked.
+
+import { SPAN_MS } from "./link.js";
+import { way } from "./grid.js";
+import { make, set } from "./svg.js";
+import { say } from "./words.js";
+
+/** The trail fades in so many steps. */
+const TRAIL = 6;
+/** An obstacle of a simulated world in mm, along its way and across it, and in pixels at least. */
+const OBSTACLE = [80, 160];
+const OBSTACLE_PX = [6, 14];
+
+export class Ways {
+  /** The layers from the bottom up. */
+  constructor(svg) {
+    this.trail = make("g", { class: "trail" }, svg);
+    for (let step = 0; step < TRAIL; step++) make("polyline", { opacity: (0.55 * (TRAIL - step)) / TRAIL }, this.trail);
+    this.gap = make("polyline", { class: "gap" }, svg);
+    this.route = make("polyline", { class: "route" }, svg);
+    this.placed = make("g", {}, svg);
+    this.found = make("g", {}, svg);
+    this.next = make("g", { class: "next" }, svg);
+    make("circle", {}, this.next);
+    make("circle", { class: "dot" }, this.next);
+  }
+
+  show(isShown, isKnown) {
+    this.trail.toggleAttribute("hidden", !isShown);
+    for (const part of [this.gap, this.route, this.next]) part.toggleAttribute("hidden", !isKnown);
+  }
+
+  drawTrail(robot, floor, now) {
+    // One point in four, and nothing new between them.
+    const count = Math.floor(robot.total / 4);
+    if (this.trailed === count && this.trailOf === robot) return;
+    this.trailed = count;
+    this.trailOf = robot;
+    const steps = Array.from({ length: TRAIL }, () => []);
+    for (let i = robot.past.length - 1; i >= 0; i -= 4) {
+      const { at, x, y } = robot.past[i];
+      if (now - at > SPAN_MS) break;
+      if (x === null || y === null) continue;
+      const drawn = floor.onWayOut({ x, y, heading: 0 });
+      const point = `${Math.round(drawn.x)},${-Math.round(drawn.y)}`;
+      const step = Math.floor(((now - at) * TRAIL) / SPAN_MS);
+      // Each step begins where the younger one ends.
+      if (step > 0 && !steps[step]?.length) steps[step - 1].push(point);
+      steps[step]?.push(point);
+    }
+    steps.forEach((points, step) => set(this.trail.children[step], "points", points.join(" ")));
+  }
+
+  drawRoute(robot, pose, side) {
+    const nodes = robot.route.map(([x, y]) => `${x * side},${-y * side}`);
+    for (const line of [this.gap, this.route]) set(line, "points", [`${Math.round(pose.x)},${Math.round(-pose.y)}`, ...nodes].join(" "));
+    const next = nextOf(robot, side);
+    this.next.toggleAttribute("hidden", !next);
+    if (next) set(this.next, "transform", `translate(${next[0]} ${-next[1]})`);
+  }
+
+  /** What was put on ways is a bar across them; what the robot has found blocked is a cross. */
+  drawThings(robot, side, px) {
+    const shown = [side, px, ...robot.placed, "", ...robot.blocked.keys()].join(";");
+    if (this.shown === shown) return;
+    this.shown = shown;
+    this.placed.replaceChildren();
+    this.found.replaceChildren();
+    for (const words of robot.placed) {
+      const { dx, middle: [x, y] } = way(words, side);
+      const [along, across] = [0, 1].map((at) => Math.max(OBSTACLE[at], OBSTACLE_PX[at] * px));
+      const [width, height] = dx ? [along, across] : [across, along];
+      const bar = make("rect", { class: "placed", x: x - width / 2, y: -y - height / 2, width, height }, this.placed);
+      make("title", { "data-word": "placed" }, bar, say("placed"));
+    }
+    for (const words of robot.blocked.keys()) {
+      const { middle: [x, y] } = way(words, side);
+      const cross = make("g", { class: "blocked", transform: `translate(${x} ${-y})` }, this.found);
+      make("title", { "data-word": "found" }, cross, say("found"));
+      const arm = Math.min(10 * px, side / 4);
+      const d = `M${-arm} ${-arm}L${arm} ${arm}M${arm} ${-arm}L${-arm} ${arm}`;
+      make("path", { class: "back", d }, cross);
+      make("path", { d }, cross);
+    }
+  }
+}
+
+/** The next crossing of a robot in mm; null if it goes to none. */
+export function nextOf({ state: { next, x_mm: x } }, side) {
+  return next === undefined || x === undefined ? null : next.split(",").map((number) => Number(number) * side);
+}
+
+/** How long ago a way was found blocked, in whole seconds of the robot's clock. */
+export function blockedFor(robot, words) {
+  return Math.max(0, Math.floor(Number(robot.state.time_ms) / 1_000) - robot.blocked.get(words));
+}
