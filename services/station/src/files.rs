@@ -12,7 +12,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, fchown};
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use rustix::fs::OFlags;
 use serde::de::DeserializeOwned;
@@ -239,17 +239,22 @@ pub struct Hold {
     _file: File,
 }
 
+/// How long a process that ends may still hold its files: those of a supervisor that was killed end
+/// a moment after it.
+const ENDING: Duration = Duration::from_secs(2);
+
 impl Hold {
     /// Holds the file at `path`, which need not exist yet. `None` where no lock can be made: nobody
     /// can replace a file there either.
     ///
     /// # Errors
-    /// Another process holds it.
+    /// Another process holds it, and does not end within two seconds.
     pub fn of(path: &Path) -> Result<Option<Self>, HeldBy> {
         let Ok(target) = behind_links(path) else {
             return Ok(None);
         };
         let lock = beside(&target, "lock");
+        let since = Instant::now();
         loop {
             let mut options = OpenOptions::new();
             options.read(true).write(true).create(true).truncate(false);
@@ -259,6 +264,10 @@ impl Hold {
             };
             match file.try_lock() {
                 Ok(()) => {}
+                Err(TryLockError::WouldBlock) if since.elapsed() < ENDING => {
+                    std::thread::sleep(ENDING / 100);
+                    continue;
+                }
                 Err(TryLockError::WouldBlock) => {
                     let mut pid = String::new();
                     let _ = file.take(16).read_to_string(&mut pid);

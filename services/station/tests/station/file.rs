@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use lager_floor::Node;
 use lager_lines::Called;
 use lager_plant::{NamedProduct, Warehouse};
+use lager_station::files::Hold;
 use lager_station::{LoadError, SaveError, find, load, save, told};
 
 use crate::transcript::{WAREHOUSE, product, warehouse};
@@ -283,4 +284,17 @@ fn what_could_not_be_read_again_is_not_saved() {
     assert!(matches!(error, SaveError::Unreadable { .. }), "{error}");
     let text = fs::read_to_string(folder.file()).expect("the file");
     assert_eq!(text, WAREHOUSE);
+}
+
+#[test]
+fn who_comes_while_another_process_ends_gets_its_file() {
+    let folder = Folder::new("ending");
+    let first = Hold::of(&folder.file()).expect("nobody has it");
+    let ends = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        drop(first.expect("a lock"));
+    });
+    let second = Hold::of(&folder.file()).expect("the first one ends");
+    assert!(second.is_some());
+    ends.join().expect("it has ended");
 }
