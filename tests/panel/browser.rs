@@ -223,8 +223,22 @@ impl Page {
 
     /// Clicks on an element.
     pub(crate) fn click(&mut self, selector: &str) {
-        let at = self.middle(selector);
+        let at = self.settled(|page| page.middle(selector));
         self.click_at(at);
+    }
+
+    /// A place once it has not moved for a moment, or after 2 s: what has just been shown moves what
+    /// stands below it.
+    fn settled(&mut self, place: impl Fn(&mut Self) -> (f64, f64)) -> (f64, f64) {
+        let mut at = place(self);
+        for _ in 0..40 {
+            std::thread::sleep(Duration::from_millis(50));
+            let now = place(self);
+            if std::mem::replace(&mut at, now) == now {
+                break;
+            }
+        }
+        at
     }
 
     /// Clicks at a point in pixels.
@@ -237,14 +251,8 @@ impl Page {
     /// Clicks at a point of the warehouse, in mm from node (0, 0).
     pub(crate) fn click_at_mm(&mut self, right: f64, up: f64) {
         // After a view has opened, the map gets its final size some frames later.
-        let mut at = self.place_of_mm(right, up);
-        loop {
-            std::thread::sleep(Duration::from_millis(150));
-            let now = self.place_of_mm(right, up);
-            if std::mem::replace(&mut at, now) == now {
-                break;
-            }
-        }
+        std::thread::sleep(Duration::from_millis(100));
+        let at = self.settled(|page| page.place_of_mm(right, up));
         self.click_at(at);
     }
 

@@ -270,7 +270,7 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     let browser = Browser::new();
     let stranger = driver.split('?').next().expect("an address");
     let mut page = browser.page(stranger);
-    page.wait_until("document.body.textContent.includes('?token=')");
+    page.wait_until("document.body.textContent.includes('with its token')");
 
     let open = |url: &str| {
         let mut page = browser.page(url);

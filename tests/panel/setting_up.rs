@@ -134,7 +134,7 @@ pub(crate) fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step(
          return read('.value').every((value) => value > 0) && \
            Math.min(...read('.on .value')) > Math.max(...read('.sensor:not(.on) .value')); })()",
     );
-    page.wait_for("#calibration-said", "of the 11");
+    page.wait_for("#calibration-said", "of 11");
     page.wait_until("!document.querySelector('#calibrate').disabled");
 }
 
