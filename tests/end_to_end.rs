@@ -99,10 +99,10 @@ fn the_terminal_says_what_the_robot_does_and_a_person_orders_more() {
     });
     // The log reports a delivery after the state shows it.
     for words in [
-        "fetches product 1",
+        "fetches goods 1",
         "is in position at product 1",
         "leaves the station with product 1",
-        "DELIVERED product 1",
+        "DELIVERED goods 1",
     ] {
         wait_for(words, || up.output().contains(words).then_some(()));
     }

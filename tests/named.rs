@@ -153,7 +153,7 @@ fn a_robot_of_somebody_elses_station_takes_numbers_only() {
     let args = ["up", "--headless", "--warehouse", &warehouse, "--station"];
     let up = domain.start(&[&args[..], &[address.as_str()]].concat());
     wait_for("what the station orders by its name", || {
-        up.output().contains("fetches product 1").then_some(())
+        up.output().contains("fetches goods 1").then_some(())
     });
     let refused = domain.run(&["fetch", "screws"]);
     let why = said(&refused);

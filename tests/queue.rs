@@ -204,7 +204,7 @@ fn what_waits_outlives_up_and_a_script_leaves_it_alone() {
     std::fs::write(&kept, "[[order]]\nid = ").expect("a file");
     let mut up = domain.start(&["up", "--headless", "--speed", "4"]);
     wait_for("the robot", || {
-        up.output().contains("fetches product 1").then_some(())
+        up.output().contains("fetches goods 1").then_some(())
     });
     assert!(
         up.output().contains("orders.toml.damaged-"),
@@ -221,7 +221,7 @@ fn delivered_goods_are_shown_as_gone_and_not_fetched_again() {
     let domain = Domain::new();
     let mut up = domain.start(&["up", "--headless", "--speed", "6", "--mission", "1"]);
     wait_for("the delivery", || {
-        up.output().contains("DELIVERED product 1").then_some(())
+        up.output().contains("DELIVERED goods 1").then_some(())
     });
     wait_for("it to be shown", || {
         let map = said(&domain.run(&["map"]));
@@ -310,7 +310,7 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
         (listed(&domain) == "no order is under way or waits").then_some(())
     });
     // The log reports a delivery after the state shows it.
-    let delivered = |up: &Running| up.output().matches("DELIVERED product").count();
+    let delivered = |up: &Running| up.output().matches("DELIVERED goods").count();
     wait_for("both to be told", || (delivered(&up) >= 2).then_some(()));
     assert_eq!(delivered(&up), 2, "{}", up.output());
     up.signal(Signal::INT);

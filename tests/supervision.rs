@@ -484,7 +484,7 @@ fn on_a_busy_machine_nothing_is_called_damaged_and_the_mission_is_carried_out() 
         assert!(!up.output().contains("damaged"), "{}", up.output());
     }
     let mut up = domain.start(&args);
-    let was_delivered = |up: &Running| up.output().contains("DELIVERED product 1");
+    let was_delivered = |up: &Running| up.output().contains("DELIVERED goods 1");
     let began = Instant::now();
     while began.elapsed() < Duration::from_secs(120) && !was_delivered(&up) {
         assert!(up.is_running(), "{}{}", up.log(), up.output());
@@ -541,7 +541,7 @@ fn up_says_how_it_ends_and_each_thing_once_and_counts_what_anybody_orders() {
     let says = |words: &str| {
         wait_for(words, || up.output().contains(words).then_some(()));
     };
-    says("fetches product 1");
+    says("fetches goods 1");
     let run = |words: &[&str]| {
         let told = domain.run(words);
         assert!(told.status.success(), "{words:?}: {told:?}");
@@ -551,8 +551,8 @@ fn up_says_how_it_ends_and_each_thing_once_and_counts_what_anybody_orders() {
     says("STOPPED");
     run(&["resume"]);
     says("the stop is released");
-    says("DELIVERED product 1");
-    says("DELIVERED product 2");
+    says("DELIVERED goods 1");
+    says("DELIVERED goods 2");
     interrupt(&mut up, 0);
     let told = up.output() + &up.log();
     let first = up.output().lines().next().map(str::to_owned);

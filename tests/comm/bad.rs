@@ -167,7 +167,7 @@ fn a_robot_delivers_while_its_station_sends_what_it_should_not() {
         &address,
     ]);
     wait_for("the robot to be under way", || {
-        up.output().contains("fetches product 2").then_some(())
+        up.output().contains("fetches goods 2").then_some(())
     });
     let comm = up.service("comm").expect("it runs");
     let before = peak_kib(comm);
@@ -175,7 +175,7 @@ fn a_robot_delivers_while_its_station_sends_what_it_should_not() {
     let listener = wait_for("the port to be free", || TcpListener::bind(&address).ok());
     let bad = BadStation::new(&listener);
     wait_for("the delivery", || {
-        up.output().contains("DELIVERED product 2").then_some(())
+        up.output().contains("DELIVERED goods 2").then_some(())
     });
     assert_eq!(up.service("comm"), Some(comm), "comm has ended");
     let more = peak_kib(comm) - before;

@@ -162,7 +162,7 @@ fn goods_are_picked_up_by_steps_of_the_arm_and_delivered() {
     asking.robot.says("pickup_done");
     assert_eq!(asking.robot.waits_for(&["fetchprod"]), "fetchprod");
     wait_for("`up` to tell of it", || {
-        up.output().contains("DELIVERED product 2").then_some(())
+        up.output().contains("DELIVERED goods 2").then_some(())
     });
     drop((asking, truth, bus, up));
     domain.assert_clean();

@@ -34,7 +34,7 @@ fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
     });
     TcpStream::connect(address).expect("robots may connect there");
     wait_for("the order of the station's queue", || {
-        up.output().contains("fetches product 1").then_some(())
+        up.output().contains("fetches goods 1").then_some(())
     });
 
     let mut gag = domain
@@ -57,10 +57,10 @@ fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
     assert!(said.contains("column 11"), "{said}");
     assert!(said.contains("  > fetchprod 2"), "{said}");
     wait_for("the order of the person", || {
-        up.output().contains("fetches product 2").then_some(())
+        up.output().contains("fetches goods 2").then_some(())
     });
     assert!(
-        up.output().contains("DELIVERED product 1"),
+        up.output().contains("DELIVERED goods 1"),
         "{}",
         up.output()
     );

@@ -48,7 +48,7 @@ fn a_robot_that_goes_on_delivers_without_its_station() {
     let domain = Domain::among_others();
     let (up, _) = robot_without_station(&domain, "go-on");
     wait_for("the delivery", || {
-        up.output().contains("DELIVERED product 1").then_some(())
+        up.output().contains("DELIVERED goods 1").then_some(())
     });
     drop(up);
     domain.assert_clean();
@@ -101,6 +101,6 @@ fn a_robot_that_stands_ends_the_edge_and_goes_on_when_the_station_is_back() {
     }
     let _back = station_at(&domain, &address, &[]);
     wait_for("the delivery", || {
-        up.output().contains("DELIVERED product 1").then_some(())
+        up.output().contains("DELIVERED goods 1").then_some(())
     });
 }

@@ -247,10 +247,10 @@ fn two_robots_of_one_station_deliver_though_both_are_killed() {
     second.wait();
     let second = robot("r2");
     wait_for("what the station told the first", || {
-        said(&first, "DELIVERED product 2").then_some(())
+        said(&first, "DELIVERED goods 2").then_some(())
     });
     wait_for("what it told the second", || {
-        said(&second, "DELIVERED product 1").then_some(())
+        said(&second, "DELIVERED goods 1").then_some(())
     });
     assert!(!said(&first, "product 3") && !said(&second, "product 2"));
 }

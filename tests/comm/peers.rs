@@ -146,7 +146,7 @@ fn a_robert_of_strangers_has_goods_fetched() {
     ]);
     robert.ends_well();
     for product in [2, 3] {
-        let told = format!("DELIVERED product {product}");
+        let told = format!("DELIVERED goods {product}");
         wait_for(&told, || up.output().contains(&told).then_some(()));
     }
     assert_eq!(up.output().matches("DELIVERED").count(), 2);
