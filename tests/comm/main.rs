@@ -252,7 +252,7 @@ fn two_robots_of_one_station_deliver_though_both_are_killed() {
     wait_for("what it told the second", || {
         said(&second, "DELIVERED goods 1").then_some(())
     });
-    assert!(!said(&first, "product 3") && !said(&second, "product 2"));
+    assert!(!said(&first, "goods 3") && !said(&second, "goods 2"));
 }
 
 #[test]
