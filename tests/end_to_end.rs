@@ -100,8 +100,8 @@ fn the_terminal_says_what_the_robot_does_and_a_person_orders_more() {
     // The log reports a delivery after the state shows it.
     for words in [
         "fetches goods 1",
-        "is in position at product 1",
-        "leaves the station with product 1",
+        "is in position at goods 1",
+        "leaves the station with goods 1",
         "DELIVERED goods 1",
     ] {
         wait_for(words, || up.output().contains(words).then_some(()));

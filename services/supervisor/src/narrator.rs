@@ -258,12 +258,12 @@ impl Narrator {
                 status.product
             ),
             Some(Phase::Positioning) => "turns in to the station".into(),
-            Some(Phase::Picking) => format!("is in position at product {}", status.product),
+            Some(Phase::Picking) => format!("is in position at goods {}", status.product),
             // Somebody may cancel an order while the robot turns in, or send the robot off.
             Some(Phase::Leaving) if status.goal != Goal::Delivery => {
                 "leaves the station without goods".into()
             }
-            Some(Phase::Leaving) => format!("leaves the station with product {}", status.product),
+            Some(Phase::Leaving) => format!("leaves the station with goods {}", status.product),
             Some(Phase::Exiting) => "follows the line to the delivery station".into(),
             Some(Phase::Dropping) => format!("lays down product {}", status.product),
             Some(Phase::BackingOff) => "backs off from the delivery station".into(),
