@@ -117,8 +117,8 @@ fn what_nothing_is_called_is_no_mission() {
 fn a_file_whose_names_would_mean_two_things_is_refused() {
     let domain = Domain::new();
     for (name, why) in [
-        ("screws", "two products are named screws;"),
-        ("3", "named 3, which people would take for its number"),
+        ("screws", "two goods are named screws;"),
+        ("3", "named 3, which people would take for their number"),
     ] {
         let warehouse = file(&domain, "wood glue", name);
         for command in ["up", "station"] {

@@ -59,11 +59,7 @@ fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
     wait_for("the order of the person", || {
         up.output().contains("fetches goods 2").then_some(())
     });
-    assert!(
-        up.output().contains("DELIVERED goods 1"),
-        "{}",
-        up.output()
-    );
+    assert!(up.output().contains("DELIVERED goods 1"), "{}", up.output());
     drop(up);
     domain.assert_clean();
 }

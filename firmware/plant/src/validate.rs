@@ -227,10 +227,10 @@ mod tests {
                 error(|w| w.exit.curve = Curve::Left),
                 "with this curve it must be from 88",
             ),
-            (error(|w| w.products[1].id = 1), "product 1 is listed twice"),
+            (error(|w| w.products[1].id = 1), "goods 1 are listed twice"),
             (
                 error(|w| w.products = vec![w.products[0].clone(); 257]),
-                "there are 257 products; at most 256 fit",
+                "the warehouse has 257 goods; at most 256 fit",
             ),
             (
                 error(|w| w.products[0].square = Node::new(2, 0)),

@@ -60,7 +60,7 @@ fn delivered_goods_are_not_fetched_again_until_they_are_back() {
         "{said}"
     );
     assert!(
-        said.contains("s ago; put it back and say that it is there"),
+        said.contains("s ago; put them back and say that they are there"),
         "{said}"
     );
     assert!(

@@ -174,7 +174,11 @@ fn a_board_that_refuses_for_ever_is_reported() {
     let mut trial = mission();
     trial.body.refuse = u32::MAX;
     assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Stuck));
-    assert!(said(&trial, "does not do what I ask"), "{}", trial.story());
+    assert!(
+        said(&trial, "does not do what it is asked"),
+        "{}",
+        trial.story()
+    );
     let tries = trial.body.begun.len();
     trial.run_for(SECOND * 10);
     assert_eq!(trial.body.begun.len(), tries, "it has given up");
@@ -265,7 +269,7 @@ fn a_lost_line_stops_the_robot() {
     let mut trial = run_to(Phase::Exiting);
     trial.body.y += 100.0;
     assert!(trial.run_until(SECOND * 10, |trial| trial.phase() == Phase::Stuck));
-    assert!(said(&trial, "lost the line"), "{}", trial.story());
+    assert!(said(&trial, "the line is lost"), "{}", trial.story());
     trial.run_for(SECOND);
     let (x, y) = (trial.body.x, trial.body.y);
     trial.run_for(SECOND);
@@ -292,7 +296,11 @@ fn a_station_without_a_mark_is_looked_for_from_both_ends_and_given_up() {
     trial.body.floor = Floor::new(&warehouse((2, 2), (0, 0), 45, &[]), EXIT);
     trial.order(1, 1);
     assert!(trial.run_until(SECOND * 120, |trial| trial.phase() == Phase::Stuck));
-    assert!(said(&trial, "cannot find the mark"), "{}", trial.story());
+    assert!(
+        said(&trial, "mark of the pick station is not found"),
+        "{}",
+        trial.story()
+    );
     let nodes: Vec<_> = trial
         .events
         .iter()
@@ -373,7 +381,7 @@ fn a_station_out_of_sight_after_a_disturbed_turn_is_a_failure_that_says_so() {
         "{failure}"
     );
     assert!(
-        said(&trial, "do not see its mark in 8 turns"),
+        said(&trial, "does not see its mark; turns: 8"),
         "{}",
         trial.story()
     );
