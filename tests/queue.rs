@@ -232,7 +232,7 @@ fn delivered_goods_are_shown_as_gone_and_not_fetched_again() {
     let why = said(&again);
     assert!(why.contains("goods 1 were delivered "), "{why}");
     assert!(
-        why.contains("put it back") && why.contains("`lager map back`"),
+        why.contains("put them back") && why.contains("`lager map back`"),
         "{why}"
     );
     // In the simulated world the goods are in another place, and it says so.
