@@ -12,7 +12,7 @@
 //!
 //! An `import` stands in one line and names the things that it imports. An `export` stands before
 //! its `const`, `function` or `class`. The page's modules use no other form, and a test checks
-//! that.
+//! that. Comments that have lines of their own are left out.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -36,15 +36,19 @@ fn add<'s>(
     };
     let mut body = String::new();
     let mut exports = Vec::new();
+    let mut is_comment = false;
     for line in text.lines() {
-        if let Some((wanted, from)) = import(line) {
+        let begins = line.trim_start();
+        if is_comment || begins.starts_with("/**") {
+            is_comment = !line.ends_with("*/");
+        } else if let Some((wanted, from)) = import(line) {
             add(from, source, added, script);
             let _ = writeln!(body, "const {{ {wanted} }} = ${from};");
         } else if let Some(rest) = line.strip_prefix("export ") {
             exports.extend(exported(rest));
             body.push_str(rest);
             body.push('\n');
-        } else if !line.trim_start().starts_with("//") {
+        } else if !begins.starts_with("//") {
             body.push_str(line);
             body.push('\n');
         }
@@ -84,7 +88,7 @@ mod tests {
                 Some("import { b } from \"./b.js\";\nimport { c, d } from \"./c.js\";\nb(c);\n")
             }
             "b" => Some(
-                "// What b is.\nimport { c } from \"./c.js\";\nexport function b(x) {\n  return x + c;\n}\n",
+                "// What b is.\n/** Of one line. */\n  /**\n   * Of more.\n   */\nimport { c } from \"./c.js\";\nexport function b(x) {\n  return x + c;\n}\n",
             ),
             "c" => Some("export const c = 1;\nexport class d {}\nconst hidden = 2;\n"),
             _ => None,
