@@ -20,6 +20,8 @@ pub(crate) struct Boards {
     pub(crate) written: u64,
     /// The number of reports that the steering board has sent.
     pub(crate) reports: u64,
+    /// The number of packets without a frame that the sensor board has sent, after silences.
+    pub(crate) statuses: u64,
 }
 
 impl Boards {
@@ -33,6 +35,7 @@ impl Boards {
             commands: Vec::new(),
             written: 0,
             reports: 0,
+            statuses: 0,
         }
     }
 
@@ -67,7 +70,8 @@ impl Boards {
             say(&mut self.steering, answer);
         }
         // Not a frame: nothing of it is published on the bus.
-        let _ = self.sensor.speak(STATUS);
+        let told = self.sensor.speak(STATUS);
+        self.statuses += u64::from(told.unwrap_or(false));
         let code = self.commands.last().map_or(0, |command| command.code);
         let reported = self.steering.speak(wheels_in_the_air(code));
         self.reports += u64::from(reported.unwrap_or(false));
