@@ -5,9 +5,9 @@
 //! Last comes the thought, on which no service acts. If the process is killed between any two of
 //! these, its successor knows at least as much as the bridge: an event may come twice, but is never
 //! lost. A status follows every event at once, so whoever has read a later status knows everything
-//! that follows from the event. Only a setpoint that replaces a setpoint goes out before the status, because it may be
-//! given twice. The successor may not know its number, so it leaves one number out when it resumes
-//! from a status. An unchanged order is renewed every 40 ms of robot time.
+//! that follows from the event. Only a setpoint that replaces a setpoint goes out before the status,
+//! because it may be given twice. The successor may not know its number, so it leaves one number out
+//! when it resumes from a status. An unchanged order is renewed every 40 ms of robot time.
 
 use core::time::Duration;
 
