@@ -227,6 +227,21 @@ impl Page {
         self.click_at(at);
     }
 
+    /// Clicks until an expression of the page is true. What came too late is refused, and then a
+    /// person clicks again.
+    pub(crate) fn click_until(&mut self, selector: &str, expression: &str) {
+        wait_for(expression, || {
+            self.click(selector);
+            for _ in 0..100 {
+                if self.value(expression) == true {
+                    return Some(());
+                }
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            None
+        });
+    }
+
     /// A place once it has not moved for a moment, or after 2 s: what has just been shown moves what
     /// stands below it.
     fn settled(&mut self, place: impl Fn(&mut Self) -> (f64, f64)) -> (f64, f64) {

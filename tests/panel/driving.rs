@@ -203,6 +203,9 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
     page.wait_until("document.querySelector('#control').disabled");
 }
 
+/// The page has been told where the robot stands.
+const IS_SAID: &str = "!document.querySelector('#where').open";
+
 pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile(
     scene: &mut Scene,
     page: &mut Page,
@@ -211,8 +214,7 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
     scene.take_over(page);
     page.click("#where-ask");
     page.value("document.querySelector('#where-form').elements.at.value = 'delivery'");
-    page.click("#where [type=submit]");
-    page.wait_until("!document.querySelector('#where').open");
+    page.click_until("#where [type=submit]", IS_SAID);
     page.wait_for("#map-text", "The robot is at (0, 0)");
     page.click("#armed");
     page.value("document.activeElement.blur()");
@@ -272,8 +274,7 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
          [x.value, y.value, looks.value] = ['1', '1', 'up']; \
          x.dispatchEvent(new Event('input', { bubbles: true })); })()",
     );
-    page.click("#where [type=submit]");
-    page.wait_until("!document.querySelector('#where').open");
+    page.click_until("#where [type=submit]", IS_SAID);
     page.wait_for("#map-text", "The robot is at (1, 1) and looks up");
     page.wait_for("#mode", "AUTONOMOUS");
     wait_for("it to have been carried", || {
@@ -286,8 +287,7 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
     page.click("#where-ask");
     page.fill("#where [name=x]", "99");
     page.value("document.querySelector('#where-form').elements.at.value = 'delivery'");
-    page.click("#where [type=submit]");
-    page.wait_until("!document.querySelector('#where').open");
+    page.click_until("#where [type=submit]", IS_SAID);
 }
 
 pub(crate) fn by_hand_needs_the_wheel_and_asks_during_a_mission(

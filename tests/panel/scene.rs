@@ -126,13 +126,19 @@ impl Scene {
 
     /// Sets the manual mode from a page that has the wheel.
     pub(crate) fn by_hand(&self, page: &mut Page) {
-        page.click("#manual");
-        // For a robot on its way, the page asks first.
+        // For a robot on its way, the page asks first. What came too late is refused.
         wait_for("the mode to be the hand's", || {
-            if page.value("document.querySelector('#hand').hidden") == false {
-                page.click("#hand-now");
+            page.click("#manual");
+            for _ in 0..100 {
+                if page.value("document.querySelector('#hand').hidden") == false {
+                    page.click("#hand-now");
+                }
+                if page.text("#mode").contains("BY HAND") {
+                    return Some(());
+                }
+                std::thread::sleep(std::time::Duration::from_millis(50));
             }
-            page.text("#mode").contains("BY HAND").then_some(())
+            None
         });
     }
 

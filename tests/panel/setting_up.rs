@@ -112,15 +112,16 @@ pub(crate) fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step(
     page.wait_until("document.querySelector('#sensors .on') !== null");
     scene.take_over(page);
     page.click("#tab-line");
+    let are = |p: &str, d: &str| {
+        format!("document.querySelector('#gains-now').textContent === 'now {p} and {d}'")
+    };
     for (p, d) in [("3", "4"), ("5", "6")] {
         page.fill("#gains [name=p]", p);
         page.fill("#gains [name=d]", d);
-        page.click("#gains [type=submit]");
-        page.wait_for("#gains-now", &format!("now {p} and {d}"));
+        page.click_until("#gains [type=submit]", &are(p, d));
     }
     page.wait_for("#gains-back", "Put back 3 and 4");
-    page.click("#gains-back");
-    page.wait_for("#gains-now", "now 3 and 4");
+    page.click_until("#gains-back", &are("3", "4"));
 
     // It stands still on its tape, so no sensor sees both, and the board says so for each sensor.
     page.click("#calibrate");
@@ -173,18 +174,8 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
             line + 2
         )
     };
-    // What was held up is refused with a reason, and then a person clicks again.
     let click = |page: &mut Page, selector: &str, queue: &str| {
-        let mut said = page.text("#missions-said");
-        page.click(selector);
-        wait_for(&format!("the queue to be {queue:?}"), || {
-            let says = page.text("#missions-said");
-            if says != said && !says.is_empty() {
-                page.click(selector);
-            }
-            said = says;
-            (page.value(waiting) == queue).then_some(())
-        });
+        page.click_until(selector, &format!("{waiting} === '{queue}'"));
     };
     click(page, &button(1, 1), "3,2");
     click(page, &button(0, 2), "2,3");
