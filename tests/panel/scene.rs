@@ -182,6 +182,7 @@ impl Scene {
         page.save_into(folder);
         page.click("#tab-log");
         assert_eq!(page.text("#save-span option"), "10 min");
+        page.wait_until("!document.querySelector('#save-csv').disabled");
         page.click("#save-csv");
         let table = wait_for("the table", || {
             let text = std::fs::read_to_string(folder.join("r1.csv")).ok()?;
@@ -220,6 +221,8 @@ impl Scene {
         };
         let last = lines.lines().last().expect("a line");
         assert_eq!(cells(last), cells(head), "{last}");
+        // The page saves one file after the other.
+        page.wait_until("!document.querySelector('#save-mcap').disabled");
         page.click("#save-mcap");
         let file = folder.join("r1.mcap");
         wait_for("the recording", || file.exists().then_some(()));
