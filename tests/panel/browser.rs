@@ -160,13 +160,18 @@ impl Page {
             };
             let said: Value = serde_json::from_str(&text).expect("JSON");
             if said["id"] == number {
+                // The answer is lost with the page that gave it.
+                let message = said["error"]["message"].as_str().unwrap_or_default();
+                if method == "Runtime.evaluate" && message.contains("navigated") {
+                    return json!({ "result": {} });
+                }
                 assert!(said["error"].is_null(), "{method}: {said}");
                 return said["result"].clone();
             }
         }
     }
 
-    /// The value of a JavaScript expression in the page.
+    /// The value of a JavaScript expression in the page; null if the page is left meanwhile.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let params = json!({ "expression": expression, "returnByValue": true });
         let said = self.call("Runtime.evaluate", &params);
@@ -180,7 +185,7 @@ impl Page {
             "document.querySelector({})?.textContent ?? ''",
             json!(selector)
         ));
-        value.as_str().expect("a text").to_owned()
+        value.as_str().unwrap_or_default().to_owned()
     }
 
     /// Waits until an element's text contains `words`.
