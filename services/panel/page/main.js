@@ -1,23 +1,23 @@
 // Puts the page together: one link, one robot in view, everything drawn once a picture.
 
-import { Arm } from "./arm.js";
-import { Asked, Where } from "./ask.js";
-import { Bar } from "./bar.js";
-import { choose, named, shown } from "./chosen.js";
-import { Driving } from "./drive.js";
-import { Fleet } from "./fleet.js";
-import { ByHand } from "./hand.js";
-import { Line } from "./line.js";
-import { Link } from "./link.js";
-import { Log } from "./log.js";
-import { WarehouseMap } from "./map.js";
-import { Missions } from "./missions.js";
-import { Notify } from "./notify.js";
-import { offers } from "./offers.js";
-import { called, reason } from "./sentences.js";
-import { Setup } from "./setup.js";
-import { Strips } from "./strips.js";
-import { change, current, put, say, translate } from "./words.js";
+import { Arm } from "./missions/arm.js";
+import { Asked, Where } from "./drive/ask.js";
+import { Bar } from "./bar/bar.js";
+import { choose, named, shown } from "./station/chosen.js";
+import { Driving } from "./drive/drive.js";
+import { Fleet } from "./fleet/fleet.js";
+import { ByHand } from "./drive/hand.js";
+import { Line } from "./line/line.js";
+import { Link } from "./station/link.js";
+import { Log } from "./log/log.js";
+import { WarehouseMap } from "./map/map.js";
+import { Missions } from "./missions/missions.js";
+import { Notify } from "./bar/notify.js";
+import { offers } from "./map/offers.js";
+import { called, reason } from "./words/sentences.js";
+import { Setup } from "./setup/setup.js";
+import { Strips } from "./signals/strips.js";
+import { change, current, put, say, translate } from "./words/words.js";
 
 const at = (id) => document.getElementById(id);
 const now = () => performance.now();
@@ -141,7 +141,7 @@ for (const tab of document.querySelectorAll("[role=tab]")) {
   tab.addEventListener("click", () => show(tab));
   tab.addEventListener("keydown", (event) => {
     const tabs = [...document.querySelectorAll("[role=tab]:not([hidden])")];
-    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
     if (!step || at("armed").checked) return;
     const next = tabs[(tabs.indexOf(tab) + step + tabs.length) % tabs.length];
     show(next);
@@ -150,6 +150,7 @@ for (const tab of document.querySelectorAll("[role=tab]")) {
 }
 
 function show(tab) {
+  document.body.dataset.view = tab.getAttribute("aria-controls");
   for (const other of document.querySelectorAll("[role=tab]")) {
     const chosen = other === tab;
     other.setAttribute("aria-selected", chosen);

@@ -1,11 +1,11 @@
 // A display on the robot itself (F2): what it does, in letters that are read from some metres away.
 // It stops the robot and orders nothing else. `/screen?r2` shows that robot and nobody else.
 
-import { named, shown } from "./chosen.js";
-import { face, show } from "./face.js";
-import { Link } from "./link.js";
-import { Stop } from "./stop.js";
-import { current, decimal, put, say } from "./words.js";
+import { named, shown } from "./station/chosen.js";
+import { face, show } from "./bar/face.js";
+import { Link } from "./station/link.js";
+import { Stop } from "./bar/stop.js";
+import { current, decimal, put, say } from "./words/words.js";
 
 const at = (id) => document.getElementById(id);
 current();

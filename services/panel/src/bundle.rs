@@ -5,7 +5,7 @@
 //! other:
 //!
 //! ```text
-//!   import { put, say } from "./words.js";      const { put, say } = $words;
+//!   import { put } from "../words/words.js";    const { put } = $words_words;
 //!   export function doing(robot) {              function doing(robot) {
 //!                                               return { doing };
 //! ```
@@ -17,12 +17,17 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// The module `entry`, such as `main`, with everything that it imports. `source` returns a module's
-/// text.
+/// The module `entry`, such as `main.js`, with everything that it imports. `source` returns a
+/// module's text.
 pub(crate) fn bundle<'s>(entry: &str, source: impl Fn(&str) -> Option<&'s str>) -> String {
     let mut script = String::new();
     add(entry, &source, &mut BTreeSet::new(), &mut script);
     script
+}
+
+/// The constant that holds what a module exports.
+pub(crate) fn constant(name: &str) -> String {
+    format!("${}", name.trim_end_matches(".js").replace('/', "_"))
 }
 
 fn add<'s>(
@@ -42,8 +47,9 @@ fn add<'s>(
         if is_comment || begins.starts_with("/**") {
             is_comment = !line.ends_with("*/");
         } else if let Some((wanted, from)) = import(line) {
-            add(from, source, added, script);
-            let _ = writeln!(body, "const {{ {wanted} }} = ${from};");
+            let from = beside(name, from);
+            add(&from, source, added, script);
+            let _ = writeln!(body, "const {{ {wanted} }} = {};", constant(&from));
         } else if let Some(rest) = line.strip_prefix("export ") {
             exports.extend(exported(rest));
             body.push_str(rest);
@@ -54,16 +60,32 @@ fn add<'s>(
         }
     }
     let exports = exports.join(", ");
+    let constant = constant(name);
     let _ = write!(
         script,
-        "const ${name} = (() => {{\n{body}return {{ {exports} }};\n}})();\n"
+        "const {constant} = (() => {{\n{body}return {{ {exports} }};\n}})();\n"
     );
 }
 
 /// What a line imports, and from which module.
 fn import(line: &str) -> Option<(&str, &str)> {
-    let (wanted, from) = line.strip_prefix("import { ")?.split_once(" } from \"./")?;
-    Some((wanted, from.strip_suffix(".js\";")?))
+    let (wanted, from) = line.strip_prefix("import { ")?.split_once(" } from \"")?;
+    Some((wanted, from.strip_suffix("\";")?))
+}
+
+/// The module that `from` means in the module `name`: `../words/words.js` in `map/map.js` is
+/// `words/words.js`.
+fn beside(name: &str, from: &str) -> String {
+    let mut folders: Vec<&str> = name.split('/').collect();
+    folders.pop();
+    for part in from.split('/') {
+        match part {
+            "." => {}
+            ".." => drop(folders.pop()),
+            part => folders.push(part),
+        }
+    }
+    folders.join("/")
 }
 
 /// The name that a line exports.
@@ -84,20 +106,20 @@ mod tests {
     #[test]
     fn modules_become_one_script_each_once_and_before_who_needs_it() {
         let source = |name: &str| match name {
-            "main" => {
-                Some("import { b } from \"./b.js\";\nimport { c, d } from \"./c.js\";\nb(c);\n")
+            "main.js" => {
+                Some("import { b } from \"./in/b.js\";\nimport { c, d } from \"./c.js\";\nb(c);\n")
             }
-            "b" => Some(
-                "// What b is.\n/** Of one line. */\n  /**\n   * Of more.\n   */\nimport { c } from \"./c.js\";\nexport function b(x) {\n  return x + c;\n}\n",
+            "in/b.js" => Some(
+                "// What b is.\n/** Of one line. */\n  /**\n   * Of more.\n   */\nimport { c } from \"../c.js\";\nexport function b(x) {\n  return x + c;\n}\n",
             ),
-            "c" => Some("export const c = 1;\nexport class d {}\nconst hidden = 2;\n"),
+            "c.js" => Some("export const c = 1;\nexport class d {}\nconst hidden = 2;\n"),
             _ => None,
         };
         assert_eq!(
-            bundle("main", source),
+            bundle("main.js", source),
             "const $c = (() => {\nconst c = 1;\nclass d {}\nconst hidden = 2;\nreturn { c, d };\n})();\n\
-             const $b = (() => {\nconst { c } = $c;\nfunction b(x) {\n  return x + c;\n}\nreturn { b };\n})();\n\
-             const $main = (() => {\nconst { b } = $b;\nconst { c, d } = $c;\nb(c);\nreturn {  };\n})();\n"
+             const $in_b = (() => {\nconst { c } = $c;\nfunction b(x) {\n  return x + c;\n}\nreturn { b };\n})();\n\
+             const $main = (() => {\nconst { b } = $in_b;\nconst { c, d } = $c;\nb(c);\nreturn {  };\n})();\n"
         );
     }
 }

@@ -1,10 +1,10 @@
 // The line under the robot: the calibration of its sensors as guided steps, and the gains of the
 // control that follows it.
 
-import { judge, wrong } from "./fields.js";
-import { reason } from "./sentences.js";
-import { SENSORS, sensors } from "./strips.js";
-import { put, say } from "./words.js";
+import { judge, wrong } from "../parts/fields.js";
+import { reason } from "../words/sentences.js";
+import { SENSORS, sensors } from "../signals/strips.js";
+import { put, say } from "../words/words.js";
 
 /** The most that a line sensor reads. */
 const MOST = 255;

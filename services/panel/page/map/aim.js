@@ -3,7 +3,7 @@
 
 import { meant, nearest, nextTo } from "./grid.js";
 import { meets } from "./labels.js";
-import { put, say } from "./words.js";
+import { put, say } from "../words/words.js";
 
 /** A press that moves further than this, in pixels, moves the map and means nothing. */
 const STILL_PX = 5;

@@ -1,8 +1,8 @@
 // Words that stand at things on the map. They keep their size on the screen, and they yield: none stands over a robot,
 // over another one or, where there is room elsewhere, over goods.
 
-import { make, set } from "./svg.js";
-import { put } from "./words.js";
+import { make, set } from "../parts/svg.js";
+import { put } from "../words/words.js";
 
 /** How high a label is, how much wider than its words, and how far it stays from what it belongs to, in pixels. */
 const HIGH_PX = 20;

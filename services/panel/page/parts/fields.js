@@ -1,7 +1,7 @@
 // What is wrong in the fields of a form, in the reader's language and where the hand was. The browser would
 // say it in its own language, and would let a field block that nobody sees.
 
-import { say } from "./words.js";
+import { say } from "../words/words.js";
 
 /** Has the page judge a form. */
 export function judge(form) {

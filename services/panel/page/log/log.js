@@ -1,11 +1,11 @@
 // What has happened, as sentences in the reader's language; and what the station keeps of the last day as
 // a file.
 
-import { note } from "./link.js";
+import { note } from "../station/link.js";
 import { mcap } from "./mcap.js";
-import { fill, item } from "./missions.js";
-import { PLAIN, called, crossing, reason, sentence, thought } from "./sentences.js";
-import { clock, current, put, say, span } from "./words.js";
+import { fill, item } from "../missions/missions.js";
+import { PLAIN, called, crossing, reason, sentence, thought } from "../words/sentences.js";
+import { clock, current, put, say, span } from "../words/words.js";
 
 /** How long ago what is saved may be, in ms. */
 const SPANS_MS = [600_000, 3_600_000, 86_400_000];

@@ -4,8 +4,8 @@
 // Lengths and angles are those of the simulator's world (firmware/plant/src/arm.rs); of another arm
 // the drawing shows the right joints bent the right way.
 
-import { make } from "./svg.js";
-import { say } from "./words.js";
+import { make } from "../parts/svg.js";
+import { say } from "../words/words.js";
 
 /** Radians of one unit of position, and the middle of the range. */
 const UNIT = ((300 / 1_023) * Math.PI) / 180;

@@ -2,9 +2,9 @@
 
 import { carries, turnOf, wasDelivered } from "./goods.js";
 import { ends, oneName } from "./grid.js";
-import { crossing } from "./sentences.js";
+import { crossing } from "../words/sentences.js";
 import { blockedFor } from "./ways.js";
-import { clock, say } from "./words.js";
+import { clock, say } from "../words/words.js";
 
 /**
  * `link` and `robot` as everywhere. `fetch` orders goods or asks whether they are back, `stands` says where the robot

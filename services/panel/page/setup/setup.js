@@ -1,9 +1,9 @@
 // Setting up: the warehouse by form, file and strings, with checks as one types.
 
-import { judge, wrong } from "./fields.js";
-import { reason } from "./sentences.js";
-import { LIMITS } from "./table.js";
-import { put, say, translate } from "./words.js";
+import { judge, wrong } from "../parts/fields.js";
+import { reason } from "../words/sentences.js";
+import { LIMITS } from "../words/table.js";
+import { put, say, translate } from "../words/words.js";
 
 const SIDES = ["left", "up", "right", "down"];
 

@@ -3,8 +3,8 @@
 import { INSIDE } from "./floor.js";
 import { SIDES } from "./grid.js";
 import { meets } from "./labels.js";
-import { make, set } from "./svg.js";
-import { put, say } from "./words.js";
+import { make, set } from "../parts/svg.js";
+import { put, say } from "../words/words.js";
 
 /** A parcel's side: in mm, in pixels at least, and as a part of its square at most. */
 const SIZE = 112;

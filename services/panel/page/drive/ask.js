@@ -1,9 +1,9 @@
 // What the page asks a person: where the robot stands after it was driven by hand, and whether
 // somebody else may have the wheel. STOP and its keys work meanwhile: nothing here is in front of them.
 
-import { judge, wrong } from "./fields.js";
-import { called, reason } from "./sentences.js";
-import { put, say } from "./words.js";
+import { judge, wrong } from "../parts/fields.js";
+import { called, reason } from "../words/sentences.js";
+import { put, say } from "../words/words.js";
 
 /** Which way a robot on the delivery corner looks into the warehouse. */
 const inwards = (x) => (x === 0 ? "right" : "left");

@@ -1,7 +1,7 @@
 // Resume is held, so that nobody does it in passing. Each press ends in a resume or in a word why not.
 
-import { called, reason } from "./sentences.js";
-import { put, say } from "./words.js";
+import { called, reason } from "../words/sentences.js";
+import { put, say } from "../words/words.js";
 
 /** How long it is held, in ms. */
 const HOLD_MS = 1_000;

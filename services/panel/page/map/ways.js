@@ -1,9 +1,9 @@
 // What is on the ways of the map: the trail, the route with the next crossing, obstacles and ways found blocked.
 
-import { SPAN_MS } from "./link.js";
+import { SPAN_MS } from "../station/link.js";
 import { way } from "./grid.js";
-import { make, set } from "./svg.js";
-import { say } from "./words.js";
+import { make, set } from "../parts/svg.js";
+import { say } from "../words/words.js";
 
 /** The trail fades in so many steps. */
 const TRAIL = 6;

@@ -1,7 +1,7 @@
 // Taking a robot by hand needs the wheel. One that is on its way is not taken by a hand that slipped: the page
 // asks first, and takes it when the time is over unless it is left to the robot.
 
-import { say, put } from "./words.js";
+import { say, put } from "../words/words.js";
 
 /** How long there is to think, in ms. */
 const THINK_MS = 5_000;

@@ -1,11 +1,11 @@
 // The first row: which robot, what state it is in, who drives, how fresh; and STOP, which never waits.
 
-import { named } from "./chosen.js";
+import { named } from "../station/chosen.js";
 import { age, causeOf, face, show } from "./face.js";
-import { called, sentence } from "./sentences.js";
+import { called, sentence } from "../words/sentences.js";
 import { Resume } from "./resume.js";
 import { Stop } from "./stop.js";
-import { decimal, put, say } from "./words.js";
+import { decimal, put, say } from "../words/words.js";
 
 export class Bar {
   /** `resumes` are the buttons that end a stop when they are held. */

@@ -1,8 +1,8 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
-import { turnOf, wasDelivered } from "./goods.js";
-import { PLAIN, crossing, reason, sentence } from "./sentences.js";
-import { clock, put, say, span } from "./words.js";
+import { turnOf, wasDelivered } from "../map/goods.js";
+import { PLAIN, crossing, reason, sentence } from "../words/sentences.js";
+import { clock, put, say, span } from "../words/words.js";
 
 /** Whoever orders the same goods again within this time has clicked twice, or holds Enter. */
 const TWICE_MS = 700;

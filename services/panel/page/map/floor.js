@@ -1,8 +1,8 @@
 // The warehouse's floor: racks, tape at its true width, the way out with the place of delivery, and the numbers of
 // columns and rows. All of it is in mm, but for letters, which keep their size on the screen.
 
-import { hatch, make } from "./svg.js";
-import { put, say } from "./words.js";
+import { hatch, make } from "../parts/svg.js";
+import { put, say } from "../words/words.js";
 
 /** The bends of the way out in degrees, to the left; what lies before the first one and the bar, in mm. */
 const BENDS = { left: [90], right: [-90], s: [45, -45] };

@@ -7,12 +7,12 @@ import { Floor } from "./floor.js";
 import { Goods, carries } from "./goods.js";
 import { ends, way } from "./grid.js";
 import { Labels, meets } from "./labels.js";
-import { MM_PER_DUTY } from "./link.js";
+import { MM_PER_DUTY } from "../station/link.js";
 import { BODY, Robot } from "./robot.js";
-import { crossing } from "./sentences.js";
-import { make, set } from "./svg.js";
+import { crossing } from "../words/sentences.js";
+import { make, set } from "../parts/svg.js";
 import { Ways, blockedFor, nextOf } from "./ways.js";
-import { decimal, put, say } from "./words.js";
+import { decimal, put, say } from "../words/words.js";
 
 /** How long a robot takes to glide to a new pose, in ms. */
 const GLIDE_MS = 100;

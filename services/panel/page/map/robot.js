@@ -1,8 +1,8 @@
 // A robot on the map, to scale: hull, wheels, the eyes of its line sensors, arm, claw and what it holds.
 
-import { make, place, set, hatch } from "./svg.js";
-import { put, say } from "./words.js";
-import { above } from "./arm.js";
+import { make, place, set, hatch } from "../parts/svg.js";
+import { put, say } from "../words/words.js";
+import { above } from "../missions/arm.js";
 
 /** The body in mm: half its width with the wheels, length before and behind the axle. */
 export const BODY = { half: 102, front: 170, rear: 110 };

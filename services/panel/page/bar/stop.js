@@ -5,8 +5,8 @@
 //
 // Before this runs the form is the browser's, and is answered by a page (services/panel/src/stop.rs).
 
-import { reason, sentence } from "./sentences.js";
-import { say } from "./words.js";
+import { reason, sentence } from "../words/sentences.js";
+import { say } from "../words/words.js";
 
 /** Whether a person writes there: Space is a blank then. */
 export function isText(element) {

@@ -1,8 +1,8 @@
 // What state a robot is in, for who glances at it: one look for each, in the bar, on the map and on `/screen`.
 
-import { named } from "./chosen.js";
-import { called, crossing, failure, reason, sentence } from "./sentences.js";
-import { put, say, span } from "./words.js";
+import { named } from "../station/chosen.js";
+import { called, crossing, failure, reason, sentence } from "../words/sentences.js";
+import { put, say, span } from "../words/words.js";
 
 /** The looks, the gravest first, each with its shape in a square of 32. */
 export const SHAPES = {

@@ -1,8 +1,8 @@
 // All robots of the station at a glance, where there are two or more: who needs a person comes first.
 
-import { face, SHAPES } from "./face.js";
-import { make } from "./svg.js";
-import { decimal, put, say } from "./words.js";
+import { face, SHAPES } from "../bar/face.js";
+import { make } from "../parts/svg.js";
+import { decimal, put, say } from "../words/words.js";
 
 /** The looks, the gravest first. */
 const GRAVITY = Object.keys(SHAPES);

@@ -11,9 +11,9 @@
 // command to stand: what is held ends before one, and nothing is held or begun while one is under way.
 
 import { Pads } from "./pads.js";
-import { reason } from "./sentences.js";
-import { isText } from "./stop.js";
-import { say } from "./words.js";
+import { reason } from "../words/sentences.js";
+import { isText } from "../bar/stop.js";
+import { say } from "../words/words.js";
 
 const RENEW_MS = 50;
 /** Code 1 of the wheels. */
