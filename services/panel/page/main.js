@@ -2,6 +2,7 @@
 
 import { Arm } from "./missions/arm.js";
 import { Asked, Where } from "./drive/ask.js";
+import { at } from "./parts/at.js";
 import { Bar } from "./bar/bar.js";
 import { choose, named, shown } from "./station/chosen.js";
 import { Driving } from "./drive/drive.js";
@@ -13,13 +14,14 @@ import { Log } from "./log/log.js";
 import { WarehouseMap } from "./map/map.js";
 import { Missions } from "./missions/missions.js";
 import { Notify } from "./bar/notify.js";
+import { obstacles } from "./map/obstacle.js";
 import { offers } from "./map/offers.js";
-import { called, reason } from "./words/sentences.js";
+import { drawRemedy } from "./bar/remedy.js";
 import { Setup } from "./setup/setup.js";
 import { Strips } from "./signals/strips.js";
+import { Wheel } from "./drive/wheel.js";
 import { change, current, put, say, translate } from "./words/words.js";
 
-const at = (id) => document.getElementById(id);
 const now = () => performance.now();
 
 current();
@@ -35,6 +37,7 @@ const bar = new Bar(link, {
   { button: at("resume"), said: at("resume-said") },
   { button: at("drive-resume"), said: at("drive-resume-said") },
 ]);
+const meetWay = obstacles(link, { said: at("map-said"), undo: at("map-undo") }, robot);
 const map = new WarehouseMap(at("map"), {
   words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words) => put(at("map-said"), words),
   tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
@@ -55,6 +58,7 @@ const arm = new Arm(at("arm-drawing"));
 const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), resume: at("drive-resume") }, robot, now);
 const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("hand-said"), take: at("hand-now"), leave: at("hand-leave") }, robot, () => act("mode manual"), (...words) => driving.tell(...words));
 const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
+const wheel = new Wheel(link, { button: at("control"), name: at("name") }, robot, driving, where);
 const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: at("hand-over"), keep: at("keep") }, robot, () => driving.letGo());
 const setup = new Setup(link, {
   form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
@@ -72,28 +76,6 @@ const strips = new Strips(at("strips"));
 const notify = new Notify(link, at("notify"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
 
-/** Puts an obstacle on a way of a simulated world, or takes it away. */
-async function meetWay(edge) {
-  const shown = robot();
-  // Where one stands a second put changes nothing, so it is tried to be taken first.
-  const take = await link.act(shown, `obstacle take ${edge}`);
-  const put = take.done ? take : await link.act(shown, `obstacle put ${edge}`);
-  if (!put.done) return tell("refused", reason(put.refused));
-  const done = take.done ? "take" : "put";
-  tell(done === "put" ? "obstacle_put" : "obstacle_taken");
-  const undo = at("map-undo");
-  undo.hidden = false;
-  undo.onclick = async () => {
-    undo.hidden = true;
-    const back = await link.act(shown, `obstacle ${done === "put" ? "take" : "put"} ${edge}`);
-    tell(...(back.done ? [done === "put" ? "obstacle_taken" : "obstacle_put"] : ["refused", reason(back.refused)]));
-  };
-}
-
-function tell(...words) {
-  put(at("map-said"), say(...words));
-}
-
 async function act(action) {
   const shown = robot();
   if (!shown) return;
@@ -109,23 +91,6 @@ at("autonomous").onclick = () => {
   else act("mode autonomous");
 };
 at("where-ask").onclick = () => link.warehouse && where.ask();
-at("control").onclick = async () => {
-  const shown = robot();
-  if (!shown) return;
-  const mine = shown.driver === link.me;
-  driving.letGo();
-  driving.tell(...(shown.driver && !mine ? ["asked_for", called(shown.driver)] : [null]));
-  const answer = await link.ask(mine ? "free" : "take", shown.name);
-  driving.tell(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
-  if (mine && answer.done && where.isOpen(shown)) where.ask();
-};
-at("name").value = localStorage.getItem("name") ?? "";
-at("name").onchange = () => {
-  driving.letGo();
-  // It stands in lines of words.
-  at("name").value = at("name").value.trim().replaceAll(" ", "-");
-  link.rename(at("name").value);
-};
 at("language").onclick = () => {
   change();
   translate();
@@ -243,26 +208,9 @@ function drawRest(shown, time) {
   byHand.draw(shown);
   log.draw(shown);
   notify.draw(time);
-  const mine = shown?.driver && shown.driver === link.me;
-  const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", called(shown.driver)] : ["control_free"];
-  put(at("control"), say(...seat));
-  // Who has the wheel is not known until the robot is heard again.
-  at("control").disabled = !link.open || !shown?.connected;
-  if (!link.warehouse) tell("no_map");
+  wheel.draw(shown);
+  if (!link.warehouse) put(at("map-said"), say("no_map"));
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
-}
-/** The control of this page that ends what is wrong, by the name of the remedy. */
-const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup" };
-
-/** Beside the sentence that names a remedy stands a button that does it, or shows where it is done. */
-function drawRemedy({ remedy }) {
-  const button = at("remedy");
-  const control = REMEDIES[remedy] && at(REMEDIES[remedy]);
-  button.hidden = !control;
-  if (!control) return;
-  put(button, control.textContent);
-  button.disabled = control.disabled;
-  button.onclick = () => control.click();
 }
 link.addEventListener("pose", soon);
 soon();

@@ -1,13 +1,13 @@
 // A display on the robot itself (F2): what it does, in letters that are read from some metres away.
 // It stops the robot and orders nothing else. `/screen?r2` shows that robot and nobody else.
 
+import { at } from "./parts/at.js";
 import { named, shown } from "./station/chosen.js";
 import { face, show } from "./bar/face.js";
 import { Link } from "./station/link.js";
 import { Stop } from "./bar/stop.js";
 import { current, decimal, put, say } from "./words/words.js";
 
-const at = (id) => document.getElementById(id);
 current();
 const link = new Link();
 const robot = () => shown(link);
@@ -22,7 +22,7 @@ function picture() {
   if (wasStopped && !isStopped) stop.say(null);
   wasStopped = isStopped;
   show(face(link, seen, performance.now()), seen);
-  put(at("robot"), name() ?? "");
+  put(at("whose"), name() ?? "");
   const { mode, battery_dv } = seen?.state ?? {};
   const volts = battery_dv === undefined ? "" : say("volts", decimal(Number(battery_dv) / 10));
   put(at("figures"), [mode ? say(`mode_${mode}`) : "", volts].filter(Boolean).join(" \u00b7 "));

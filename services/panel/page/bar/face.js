@@ -1,5 +1,6 @@
 // What state a robot is in, for who glances at it: one look for each, in the bar, on the map and on `/screen`.
 
+import { at } from "../parts/at.js";
 import { named } from "../station/chosen.js";
 import { called, crossing, failure, reason, sentence } from "../words/sentences.js";
 import { put, say, span } from "../words/words.js";
@@ -113,7 +114,6 @@ export const causeOf = ({ state: { stop_cause: cause } }) => (cause !== "none" &
 /** Why there is no connection. */
 const lost = (link) => (link.closed ? reason(link.closed) : say("lost"));
 
-const at = (id) => document.getElementById(id);
 
 /** Shows a state in the page that has these parts. What became of a stop stands in the place of the proof. */
 export function show({ look, said, since, by, proof, more, isDeaf }, robot) {

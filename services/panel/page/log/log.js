@@ -1,7 +1,7 @@
 // What has happened, as sentences in the reader's language; and what the station keeps of the last day as
 // a file.
 
-import { note } from "../station/link.js";
+import { note } from "../station/report.js";
 import { mcap } from "./mcap.js";
 import { fill, item } from "../missions/missions.js";
 import { PLAIN, called, crossing, reason, sentence, thought } from "../words/sentences.js";

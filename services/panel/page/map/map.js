@@ -7,7 +7,6 @@ import { Floor } from "./floor.js";
 import { Goods, carries } from "./goods.js";
 import { ends, way } from "./grid.js";
 import { Labels, meets } from "./labels.js";
-import { MM_PER_DUTY } from "../station/link.js";
 import { BODY, Robot } from "./robot.js";
 import { crossing } from "../words/sentences.js";
 import { make, set } from "../parts/svg.js";
@@ -116,7 +115,7 @@ export class WarehouseMap {
     // Where the axle may be: as wide as odometry is wrong until the next mark, and as it was driven by hand since.
     set(this.unsure, "cx", Math.round(pose.x));
     set(this.unsure, "cy", Math.round(-pose.y));
-    const since = stale ? unheardMm(robot, now) : 0;
+    const since = stale ? robot.mayHaveDriven(now) : 0;
     set(this.unsure, "r", Math.round(unsure + robot.strayed + since + (isKnown ? 0 : BODY.front)));
     if (this.following) this.centre(pose.x, -pose.y);
   }
@@ -354,9 +353,4 @@ export class WarehouseMap {
     this.cross.toggleAttribute("hidden", !at);
     if (at) set(this.cross, "transform", `translate(${at[0]} ${-at[1]})`);
   }
-}
-
-/** How far a robot that is not heard may have driven at its last speed, in mm. */
-function unheardMm({ state: { left_duty: left = 0, right_duty: right = 0 }, stated }, now) {
-  return Math.max(Number(left), Number(right)) * MM_PER_DUTY * Math.min(Math.max(0, now - stated) / 1_000, 60);
 }

@@ -1,6 +1,6 @@
 // What is on the ways of the map: the trail, the route with the next crossing, obstacles and ways found blocked.
 
-import { SPAN_MS } from "../station/link.js";
+import { SPAN_MS } from "../station/robot.js";
 import { way } from "./grid.js";
 import { make, set } from "../parts/svg.js";
 import { say } from "../words/words.js";

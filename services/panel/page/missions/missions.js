@@ -45,7 +45,6 @@ export class Missions {
       return button;
     });
     parts.plain.append(...this.plain);
-    link.addEventListener("event", ({ detail }) => this.remember(detail));
   }
 
   /** Has a robot do something; `said` is where it says why not. */
@@ -125,25 +124,6 @@ export class Missions {
     goods.replaceChildren(...(warehouse?.product ?? []).map(({ id, name }) => new Option(name ? `${id} ${name}` : id, id)));
   }
 
-  /** Keeps when goods were fetched and delivered, what was in the way, and what cannot be reached. */
-  remember({ robot, entry }) {
-    if (entry.kind === "thought") return this.rememberThought(robot, entry.values ?? {});
-    if (entry.kind !== "event") return;
-    const [what, x, y, , product, looks] = entry.words;
-    if (what === "way_blocked") robot.detours.push({ node: `${x},${y}`, looks });
-    if (what === "getting_item") Object.assign(robot, { began: entry.at, detours: [] });
-    if (what !== "item_delivered") return;
-    const took = robot.began ? span(entry.at - robot.began) : "";
-    robot.history.unshift({ product, at: entry.at, took, detours: robot.detours });
-    robot.detours = [];
-  }
-
-  rememberThought(robot, { kind, product }) {
-    if (kind === "order_put_off") robot.unreachable.add(product);
-    if (["fetching", "order_cancelled"].includes(kind)) robot.unreachable.delete(product);
-    if (kind === "queue_cleared") robot.unreachable.clear();
-  }
-
   draw(robot, now) {
     // Another robot, or the goods are back: the question is over.
     if (this.asked && (robot !== this.asked.robot || !robot.gone.has(this.asked.product))) this.leave();
@@ -202,7 +182,7 @@ function waiting(robot) {
 /** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
 function delivered({ product, at, took, detours }, names) {
   const name = names.get(product) ?? product;
-  const words = [clock(at), took ? say("took", name, took) : name];
+  const words = [clock(at), took ? say("took", name, span(took)) : name];
   const ways = detours.map(({ node, looks }) => `${crossing(node)} ${sentence(`looks_${looks}`) ?? ""}`.trim());
   if (ways.length) words.push(say("detours", ways.join("; ")));
   return words.join("  ");

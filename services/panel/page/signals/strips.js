@@ -3,7 +3,7 @@
 // A strip moves with every picture of the screen. It is not drawn anew for that: what is there is
 // shifted by the pixels that time has passed, and what is new is drawn at its end.
 
-import { SPAN_MS } from "../station/link.js";
+import { SPAN_MS } from "../station/robot.js";
 import { decimal, put, say } from "../words/words.js";
 
 /** Word, unit, least and most value, keys of the past. */

@@ -24,10 +24,22 @@
 // Nothing here draws, and nothing here is kept when the page is closed. The station keeps it, and tells
 // on each connection what has happened; its history (services/panel/src/history.rs) has the last day.
 
-/** Older than this, in ms, nothing is shown as true. */
-export const STALE_MS = 500;
-/** How long trail and strips look back, in ms. */
-export const SPAN_MS = 60_000;
+/** @import { Fields, Warehouse } from "./robot.js" */
+
+import { fields, report } from "./report.js";
+import { Robot } from "./robot.js";
+
+/**
+ * What became of something that was asked. `isUnknown`: it was given, and nobody knows what became of it.
+ *
+ * @typedef {object} Answer
+ * @property {boolean} [done]
+ * @property {string} [told] what the station adds
+ * @property {number} [stopped] after so many ms the wheels had no duty
+ * @property {string} [refused] why not, as a code and its values
+ * @property {boolean} [isUnknown]
+ * @property {boolean} [unsent]
+ */
 
 /** How often the page says that it is there, in ms. */
 const HERE_MS = 1_000;
@@ -35,96 +47,47 @@ const HERE_MS = 1_000;
 const NO_TOKEN = "no_token";
 const RETRY_MS = [250, 500, 1_000, 2_000];
 
-/** What is known of one robot. */
-class Robot {
-  constructor(name) {
-    this.name = name;
-    this.connected = false;
-    this.speaks = false;
-    this.driver = null;
-    /** Who asks the driver for the wheel. */
-    this.asks = null;
-    /** When the station last heard it, by this page's clock. */
-    this.heard = -Infinity;
-    this.state = {};
-    /** When its state last came, by this page's clock. */
-    this.stated = -Infinity;
-    this.truth = null;
-    this.latency = null;
-    /** What each line sensor has read in the last calibration, the leftmost first. */
-    this.sensors = null;
-    this.route = [];
-    /** The products whose goods are not in their place: delivered, in the claw, or somewhere else. */
-    this.gone = new Set();
-    /** The ways on which something was put in a simulated world, as `x y side`. */
-    this.placed = [];
-    /** Where it was when that was known last, and how far it may have come since, in mm. */
-    this.pose = null;
-    this.strayed = 0;
-    /** Ways that are not taken, and since when, in s of the robot's clock. */
-    this.blocked = new Map();
-    this.queue = [];
-    this.forget();
-    this.past = [];
-    /** States heard in all. */
-    this.total = 0;
-    this.stoppedSince = null;
-  }
-
-  /** Nothing has happened yet. */
-  forget() {
-    this.events = [];
-    /** The values of the thought that comes next. */
-    this.thinks = null;
-    this.history = [];
-    /** When it set out on this order, and the ways that were found blocked on it. */
-    this.began = null;
-    this.detours = [];
-    /** Goods that wait because no way leads to them. */
-    this.unreachable = new Set();
-  }
-
-  /** Keeps an event, a thought, a refusal or what was asked, by when it was: some are told later. */
-  happened(entry) {
-    const after = this.events.findLastIndex(({ at }) => at <= entry.at);
-    this.events.splice(after + 1, 0, entry);
-    if (this.events.length > 1_000) this.events.shift();
-  }
-
-  /** Milliseconds since the robot was last heard. */
-  age(now) {
-    return now - this.heard;
-  }
-
-  isStale(now) {
-    return !this.connected || now - this.heard > STALE_MS || now - this.stated > STALE_MS;
-  }
-}
-
 export class Link extends EventTarget {
   constructor() {
     super();
+    /** @type {Map<string, Robot>} */
     this.robots = new Map();
+    /** @type {Warehouse | null} */
     this.warehouse = null;
+    /**
+     * What the station calls this page.
+     *
+     * @type {string | null}
+     */
     this.me = null;
     this.mayDrive = false;
     this.open = false;
-    /** Why the station has closed the connection, if it has said so. */
+    /**
+     * Why the station has closed the connection, if it has said so.
+     *
+     * @type {string | null}
+     */
     this.closed = null;
     this.number = 0;
+    /**
+     * Who waits for an answer, by its number.
+     *
+     * @type {Map<string, (answer: Answer) => void>}
+     */
     this.waiting = new Map();
     this.tries = 0;
-    this.connect();
+    this.socket = this.connect();
     setInterval(() => this.open && this.send("here", clock()), HERE_MS);
   }
 
+  /** @returns {WebSocket} */
   connect() {
     const url = new URL("live", location.href);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
     url.hash = "";
-    url.search = new URLSearchParams(localStorage.getItem("name") ? { name: localStorage.getItem("name") } : {});
+    const name = localStorage.getItem("name");
+    url.search = name ? String(new URLSearchParams({ name })) : "";
     const socket = new WebSocket(url);
-    this.socket = socket;
     socket.onopen = () => {
       this.open = true;
       this.tries = 0;
@@ -145,11 +108,16 @@ export class Link extends EventTarget {
       this.emit("link");
       if (!reason) this.askWhy();
       const wait = RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)];
-      setTimeout(() => this.connect(), wait);
+      setTimeout(() => (this.socket = this.connect()), wait);
     };
+    return socket;
   }
 
-  /** The person at this page is called so from now on; the station is told by a new connection. */
+  /**
+   * The person at this page is called so from now on; the station is told by a new connection.
+   *
+   * @param {string} name
+   */
   rename(name) {
     localStorage.setItem("name", name);
     this.socket.close();
@@ -165,8 +133,11 @@ export class Link extends EventTarget {
   }
 
   /**
-   * Gives an order, to one robot by its name or, with `null`, to the station; resolves to {done},
-   * {stopped: ms} or {refused: reason}, where `isUnknown` says that it was given all the same.
+   * Gives an order.
+   *
+   * @param {"do" | "stop" | "take" | "free" | "keep" | "warehouse"} verb
+   * @param {string | null} robot one robot by its name or, with `null`, the station
+   * @returns {Promise<Answer>}
    */
   ask(verb, robot, rest = "") {
     const number = ++this.number;
@@ -177,21 +148,33 @@ export class Link extends EventTarget {
     return new Promise((settle) => this.waiting.set(String(number), (answer) => settle(this.noted(robot, answer))));
   }
 
-  /** Keeps what was refused among what has happened. */
+  /**
+   * Keeps what was refused among what has happened.
+   *
+   * @param {string | null} robot
+   * @param {Answer} answer
+   */
   noted(robot, answer) {
     const { refused } = answer;
-    const asked = refused && this.robots.get(robot);
+    const asked = this.robots.get(robot ?? "");
     // A command that is given again and again is refused as often.
     const last = asked?.events.at(-1);
     const isSame = last?.kind === "refused" && last.words[0] === refused;
-    if (asked && !isSame) asked.happened({ at: Date.now(), kind: "refused", words: [refused], values: null });
+    if (asked && refused && !isSame) asked.happened({ at: Date.now(), kind: "refused", words: [refused], values: null });
     return answer;
   }
 
+  /**
+   * Has a robot do something.
+   *
+   * @param {Robot} robot
+   * @param {string} action
+   */
   act(robot, action) {
     return this.ask("do", robot.name, `${clock()} ${action}`);
   }
 
+  /** @param {(string | number | null)[]} words */
   send(...words) {
     this.socket.send(words.filter((word) => word !== "" && word !== null).join(" "));
   }
@@ -201,16 +184,19 @@ export class Link extends EventTarget {
     return this.socket.bufferedAmount;
   }
 
+  /** @param {string} line */
   hear(line) {
-    const [word, ...rest] = line.split(" ");
+    const [word, first = "", ...rest] = line.split(" ");
     if (word === "from") {
-      this.report(this.robot(rest[0]), rest[1], rest.slice(2));
+      const [what = "", ...more] = rest;
+      report(this.robot(first), what, more);
     } else if (word === "past") {
-      this.report(this.robot(rest[0]), rest[2], rest.slice(3), Number(rest[1]));
+      const [age, what = "", ...more] = rest;
+      report(this.robot(first), what, more, Number(age));
     } else if (word === "about") {
-      this.about(this.robot(rest[0]), fields(rest.slice(1)));
+      this.about(this.robot(first), fields(rest));
     } else if (word === "answer") {
-      this.answer(rest);
+      this.answer(first, rest);
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
@@ -218,12 +204,17 @@ export class Link extends EventTarget {
       // All that has happened is told after this.
       for (const robot of this.robots.values()) robot.forget();
       this.closed = null;
-      this.me = rest[0];
-      this.mayDrive = rest[1] === "driver";
+      this.me = first;
+      this.mayDrive = rest[0] === "driver";
       this.emit("link");
     }
   }
 
+  /**
+   * The robot of a name; a new one if it has not been heard of.
+   *
+   * @param {string} name
+   */
   robot(name) {
     let robot = this.robots.get(name);
     if (!robot) {
@@ -234,16 +225,24 @@ export class Link extends EventTarget {
     return robot;
   }
 
+  /**
+   * @param {Robot} robot
+   * @param {Fields} said
+   */
   about(robot, said) {
     robot.connected = said.connected === "1";
     robot.speaks = said.speaks === "1";
-    robot.driver = said.driver === "-" ? null : said.driver;
+    robot.driver = said.driver === "-" ? null : said.driver ?? null;
     robot.asks = said.asks ?? null;
     // One that speaks only the document's language shows nothing that could be old.
     robot.heard = said.age_ms === undefined ? -Infinity : performance.now() - Number(said.age_ms);
   }
 
-  answer([number, what, ...rest]) {
+  /**
+   * @param {string} number
+   * @param {string[]} words
+   */
+  answer(number, [what, ...rest]) {
     const settle = this.waiting.get(number);
     this.waiting.delete(number);
     if (!settle) return;
@@ -252,132 +251,11 @@ export class Link extends EventTarget {
     else settle({ refused: rest.join(" "), isUnknown: what === "lost" });
   }
 
-  report(robot, word, rest, age = 0) {
-    const now = performance.now();
-    if (word === "state") {
-      const state = fields(rest);
-      robot.stoppedSince = state.stop_age_ms === undefined ? null : Date.now() - Number(state.stop_age_ms);
-      stray(robot, state, now);
-      robot.state = state;
-      robot.stated = now;
-      remember(robot, now);
-    } else if (word === "route") {
-      robot.route = rest.slice(1).reduce(pairs, []);
-    } else if (word === "gone") {
-      robot.gone = new Set(rest.slice(1));
-    } else if (word === "blocked") {
-      robot.blocked = new Map();
-      for (let i = 1; i + 3 < rest.length; i += 4) {
-        robot.blocked.set(rest.slice(i, i + 3).join(" "), Number(rest[i + 3]));
-      }
-    } else if (word === "obstacles") {
-      robot.placed = [];
-      for (let i = 1; i + 2 < rest.length; i += 3) robot.placed.push(rest.slice(i, i + 3).join(" "));
-    } else if (word === "queue") {
-      robot.queue = [];
-      for (let i = 1; i + 1 < rest.length; i += 2) {
-        robot.queue.push({ order: rest[i], product: rest[i + 1] });
-      }
-    } else if (word === "truth") {
-      const [x, y, heading, carrying] = rest;
-      robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
-    } else if (word === "latency") {
-      const [longest, ...counted] = rest.map(Number);
-      // Without a frame measured there is no new figure.
-      if (counted.length > 0) robot.latency = { p50: quantile(0.5, counted, longest), p99: quantile(0.99, counted, longest) };
-    } else if (word === "sensors") {
-      robot.sensors = Array.from({ length: rest.length / 4 }, (_, sensor) => {
-        const [reading, lowest, highest, both] = rest.slice(4 * sensor, 4 * sensor + 4).map(Number);
-        return { reading, lowest, highest, both: both === 1 };
-      });
-    } else {
-      const entry = note(robot, word, rest, Date.now() - age);
-      if (entry) this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
-    }
-  }
-
+  /** @param {"link" | "robots" | "warehouse" | "pose"} name */
   emit(name) {
     this.dispatchEvent(new Event(name));
   }
 }
 
-/** Keeps what a line says that happened at a time; the entry of the log, if the line is one. */
-export function note(robot, word, rest, at) {
-  if (word === "thinks") robot.thinks = fields(rest);
-  else if (word === "because") robot.thinks = { because: rest.join(" ") };
-  if (!["event", "thought", "asked"].includes(word)) return null;
-  // A thought's values come right before it.
-  const entry = { at, kind: word, words: rest, values: word === "thought" ? robot.thinks : null };
-  robot.thinks = null;
-  robot.happened(entry);
-  return entry;
-}
-
 /** The page's clock in whole ms. */
 const clock = () => Math.round(performance.now());
-
-function fields(words) {
-  return Object.fromEntries(words.map((word) => word.split("=", 2)));
-}
-
-function pairs(list, word, index) {
-  if (index % 2 === 0) list.push([Number(word), 0]);
-  else list[list.length - 1][1] = Number(word);
-  return list;
-}
-
-/** How fast it is at most for each unit of duty, in mm/s: 73 at a duty of 104 is usual, with room above. */
-export const MM_PER_DUTY = 1;
-
-/** Keeps where it was, and how far its wheels may have taken it since nobody knows. */
-function stray(robot, { x_mm: x, y_mm: y, heading_deg: heading = 0, unsure_mm: unsure = 0, left_duty: left = 0, right_duty: right = 0 }, now) {
-  if (x !== undefined) {
-    robot.pose = { x: Number(x), y: Number(y), heading: Number(heading), unsure: Number(unsure) };
-    robot.strayed = 0;
-  } else if (robot.pose) {
-    const seconds = Math.max(0, now - robot.stated) / 1_000;
-    robot.strayed += Math.max(Number(left), Number(right)) * MM_PER_DUTY * Math.min(seconds, 60);
-  }
-}
-
-/**
- * The time that this part of all frames did not exceed, in us, interpolated within its bucket. `counted` has the
- * number and the count of each bucket in turn.
- */
-function quantile(part, counted, longest) {
-  const upper = (bucket) => (bucket < 1 ? 256 * (bucket + 1) : (5 + ((bucket - 1) % 4)) * 2 ** (6 + Math.floor((bucket - 1) / 4))) / 1_000;
-  const frames = counted.reduce((sum, count, i) => (i % 2 === 1 ? sum + count : sum), 0);
-  let left = Math.max(1, Math.ceil(part * frames));
-  for (let i = 0; i < counted.length; i += 2) {
-    const [bucket, count] = [counted[i], counted[i + 1]];
-    if (left <= count) {
-      const lower = upper(bucket - 1);
-      const end = bucket === 89 ? longest : upper(bucket);
-      return Math.round(Math.min(longest, lower + ((end - lower) * left) / count));
-    }
-    left -= count;
-  }
-  return longest;
-}
-
-/** Keeps what the strips and the trail show. */
-function remember(robot, now) {
-  robot.total += 1;
-  const { state } = robot;
-  const figure = (key) => (state[key] === undefined ? null : Number(state[key]));
-  robot.past.push({
-    at: now,
-    x: figure("x_mm"),
-    y: figure("y_mm"),
-    line_error: figure("line_error"),
-    left_duty: figure("left_duty"),
-    right_duty: figure("right_duty"),
-    distance_cm: figure("distance_cm"),
-    battery: state.battery_dv === undefined ? null : Number(state.battery_dv) / 10,
-    path_p50: robot.latency?.p50 ?? null,
-    path_p99: robot.latency?.p99 ?? null,
-    lost: ["sensor_lost", "steering_lost", "bus_lost"].reduce((sum, key) => sum + Number(state[key] ?? 0), 0),
-  });
-  // A minute at twenty a second.
-  if (robot.past.length > 1_400) robot.past.splice(0, 200);
-}

@@ -1,0 +1,24 @@
+// Beside the sentence that names a remedy stands a button that does it, or shows where it is done.
+
+/** @import { Face } from "./face.js" */
+
+import { at } from "../parts/at.js";
+import { put } from "../words/words.js";
+
+/**
+ * The control of this page that ends what is wrong, by the name of the remedy.
+ *
+ * @type {Record<string, string>}
+ */
+const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup" };
+
+/** @param {Face} face */
+export function drawRemedy({ remedy }) {
+  const button = at("remedy");
+  const control = document.getElementById((remedy && REMEDIES[remedy]) || "");
+  button.hidden = !(control instanceof HTMLButtonElement);
+  if (!(control instanceof HTMLButtonElement)) return;
+  put(button, control.textContent);
+  button.disabled = control.disabled;
+  button.onclick = () => control.click();
+}

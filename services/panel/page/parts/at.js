@@ -1,0 +1,14 @@
+// Finds what stands in the page's HTML.
+
+/**
+ * The element with an id. Its type comes from the HTML itself (checks/ids.js).
+ *
+ * @template {keyof Ids} Id
+ * @param {Id} id
+ * @returns {Ids[Id]}
+ */
+export function at(id) {
+  /** @type {any} */
+  const element = document.getElementById(id);
+  return element;
+}

@@ -1,0 +1,120 @@
+// What the lines of a station tell of a robot, taken over into the model of it.
+
+/** @import { Entry, Fields, Robot } from "./robot.js" */
+
+import { quantile } from "./quantile.js";
+
+/**
+ * The `key=value` words of a line.
+ *
+ * @param {string[]} words
+ * @returns {Fields}
+ */
+export function fields(words) {
+  return Object.fromEntries(words.map((word) => word.split("=", 2)));
+}
+
+/**
+ * Words in groups of so many; what is left over is none.
+ *
+ * @param {string[]} words
+ * @param {number} size
+ */
+function groups(words, size) {
+  return Array.from({ length: Math.floor(words.length / size) }, (_, group) => words.slice(group * size, (group + 1) * size));
+}
+
+/**
+ * Those that tell what is so now, by their first word. Before a list stands the number of its items.
+ *
+ * @type {Record<string, (robot: Robot, words: string[], now: number) => void>}
+ */
+const NOW = {
+  state: (robot, words, now) => robot.become(fields(words), now),
+  route(robot, [, ...words]) {
+    robot.route = groups(words, 2).map(([x, y]) => [Number(x), Number(y)]);
+  },
+  gone(robot, [, ...words]) {
+    robot.gone = new Set(words);
+  },
+  blocked(robot, [, ...words]) {
+    robot.blocked = new Map(groups(words, 4).map((way) => [way.slice(0, 3).join(" "), Number(way[3])]));
+  },
+  obstacles(robot, [, ...words]) {
+    robot.placed = groups(words, 3).map((way) => way.join(" "));
+  },
+  queue(robot, [, ...words]) {
+    robot.queue = groups(words, 2).map(([order = "", product = ""]) => ({ order, product }));
+  },
+  truth(robot, [x, y, heading, carrying]) {
+    robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
+  },
+  latency(robot, words) {
+    const [longest = 0, ...counted] = words.map(Number);
+    // Without a frame measured there is no new figure.
+    if (counted.length > 0) robot.latency = { p50: quantile(0.5, counted, longest), p99: quantile(0.99, counted, longest) };
+  },
+  sensors(robot, words) {
+    robot.sensors = groups(words, 4).map((sensor) => {
+      const [reading = 0, lowest = 0, highest = 0, both] = sensor.map(Number);
+      return { reading, lowest, highest, both: both === 1 };
+    });
+  },
+};
+
+/**
+ * Takes over a line that tells of a robot.
+ *
+ * @param {Robot} robot
+ * @param {string} word the first word of the line
+ * @param {string[]} rest
+ * @param {number} [age] how long ago it was, in ms
+ */
+export function report(robot, word, rest, age = 0) {
+  if (Object.hasOwn(NOW, word)) return NOW[word]?.(robot, rest, performance.now());
+  const entry = note(robot, word, rest, Date.now() - age);
+  if (entry) follow(robot, entry);
+}
+
+/**
+ * Keeps what a line says that happened at a time.
+ *
+ * @param {Pick<Robot, "thinks" | "happened">} robot
+ * @param {string} word
+ * @param {string[]} rest
+ * @param {number} at in ms since 1970
+ * @returns {Entry | null} the entry of the log, if the line is one
+ */
+export function note(robot, word, rest, at) {
+  if (word === "thinks") robot.thinks = fields(rest);
+  else if (word === "because") robot.thinks = { because: rest.join(" ") };
+  if (word !== "event" && word !== "thought" && word !== "asked") return null;
+  // A thought's values come right before it.
+  /** @type {Entry} */
+  const entry = { at, kind: word, words: rest, values: word === "thought" ? robot.thinks : null };
+  robot.thinks = null;
+  robot.happened(entry);
+  return entry;
+}
+
+/**
+ * Follows a robot's orders: when goods were fetched and delivered, what was in the way, what cannot be reached.
+ *
+ * @param {Robot} robot
+ * @param {Entry} entry
+ */
+function follow(robot, { kind, words, values, at }) {
+  if (kind === "event") {
+    const [what, x, y, , product = "", looks] = words;
+    if (what === "way_blocked") robot.detours.push({ node: `${x},${y}`, looks });
+    if (what === "getting_item") Object.assign(robot, { began: at, detours: [] });
+    if (what !== "item_delivered") return;
+    robot.history.unshift({ product, at, took: robot.began && at - robot.began, detours: robot.detours });
+    robot.detours = [];
+  } else if (kind === "thought") {
+    const { kind: thinks, product = "" } = values ?? {};
+    if (thinks === "order_put_off") robot.unreachable.add(product);
+    if (thinks === "fetching" || thinks === "order_cancelled") robot.unreachable.delete(product);
+    if (thinks === "queue_cleared") robot.unreachable.clear();
+  }
+}

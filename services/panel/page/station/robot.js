@@ -1,0 +1,259 @@
+// What is known of one robot. Views draw this, and change none of it.
+
+/** @typedef {"left" | "up" | "right" | "down"} Side */
+/** @typedef {{ x: number, y: number, heading: number }} Pose In mm with y upwards, and degrees to the right from up. */
+/** @typedef {{ id: number, name?: string, square: [number, number], side: Side }} Product */
+/**
+ * What the station's file of the floor says.
+ *
+ * @typedef {object} Warehouse
+ * @property {[number, number]} size
+ * @property {number} side_length_cm
+ * @property {[number, number]} delivery
+ * @property {Product[]} [product]
+ * @property {{ curve?: "straight" | "left" | "right" | "s", length_cm?: number, radius_cm?: number }} [exit]
+ */
+/**
+ * The fields of a robot's state, in its own words; what is not known is left out (bus/lines/src/extension/state.rs).
+ *
+ * @typedef {Partial<Record<
+ *   "time_ms" | "x_mm" | "y_mm" | "heading_deg" | "unsure_mm" | "node" | "looks" | "next" | "phase" | "hold" | "failure"
+ *   | "failure_expected" | "failure_seen" | "remedy" | "mode" | "pick" | "stopped" | "stop_cause" | "stop_by" | "stop"
+ *   | "stop_age_ms" | "stood_ms" | "order" | "product" | "delivered" | "line_bits" | "line_error" | "distance_cm"
+ *   | "left_duty" | "right_duty" | "code" | "servos" | "loads" | "servo_errors" | "battery_dv" | "sensor_up" | "steering_up"
+ *   | "sensor_lost" | "steering_lost" | "bus_lost" | "gain_p" | "gain_d", string>>} State
+ */
+/** @typedef {Partial<Record<string, string>>} Fields What stands in a line as `key=value`. */
+/**
+ * Something that has happened, in the words of its line, and when by this page's clock in ms since 1970.
+ *
+ * @typedef {{ at: number, kind: "event" | "thought" | "asked" | "refused", words: string[], values: Fields | null }} Entry
+ */
+/** @typedef {{ node: string, looks: string | undefined }} Detour A way that was found blocked. */
+/** @typedef {{ product: string, at: number, took: number | null, detours: Detour[] }} Delivery `took` is in ms. */
+/** @typedef {{ order: string, product: string }} Order */
+/** @typedef {{ reading: number, lowest: number, highest: number, both: boolean }} Sensor */
+/**
+ * One moment of the last minute.
+ *
+ * @typedef {{ at: number } & Record<"x" | "y" | "line_error" | "left_duty" | "right_duty" | "distance_cm" | "battery"
+ *   | "path_p50" | "path_p99" | "lost", number | null>} Moment
+ */
+
+/** Older than this, in ms, nothing is shown as true. */
+export const STALE_MS = 500;
+/** How long trail and strips look back, in ms. */
+export const SPAN_MS = 60_000;
+
+/** What the model keeps of it: a minute at twenty a second, and what has happened. */
+const MOMENTS = 1_400;
+const ENTRIES = 1_000;
+/** How fast it is at most for each unit of duty, in mm/s: 73 at a duty of 104 is usual, with room above. */
+const MM_PER_DUTY = 1;
+/** It is not taken to drive on for longer than this, in s. */
+const DRIVES_ON_S = 60;
+
+export class Robot {
+  /** @param {string} name */
+  constructor(name) {
+    this.name = name;
+    this.connected = false;
+    this.speaks = false;
+    /** @type {string | null} */
+    this.driver = null;
+    /**
+     * Who asks the driver for the wheel.
+     *
+     * @type {string | null}
+     */
+    this.asks = null;
+    /** When the station last heard it, by this page's clock. */
+    this.heard = -Infinity;
+    /** @type {State} */
+    this.state = {};
+    /** When its state last came, by this page's clock. */
+    this.stated = -Infinity;
+    /** @type {(Pose & { carrying: string | undefined }) | null} */
+    this.truth = null;
+    /** @type {{ p50: number, p99: number } | null} */
+    this.latency = null;
+    /**
+     * What each line sensor has read in the last calibration, the leftmost first.
+     *
+     * @type {Sensor[] | null}
+     */
+    this.sensors = null;
+    /** @type {[number, number][]} */
+    this.route = [];
+    /**
+     * The products whose goods are not in their place: delivered, in the claw, or somewhere else.
+     *
+     * @type {Set<string>}
+     */
+    this.gone = new Set();
+    /**
+     * The ways on which something was put in a simulated world, as `x y side`.
+     *
+     * @type {string[]}
+     */
+    this.placed = [];
+    /**
+     * Where it was when that was known last.
+     *
+     * @type {(Pose & { unsure: number }) | null}
+     */
+    this.pose = null;
+    /** How far it may have come since, in mm. */
+    this.strayed = 0;
+    /**
+     * Ways that are not taken, and since when, in s of the robot's clock.
+     *
+     * @type {Map<string, number>}
+     */
+    this.blocked = new Map();
+    /** @type {Order[]} */
+    this.queue = [];
+    /** @type {Moment[]} */
+    this.past = [];
+    /** States heard in all. */
+    this.total = 0;
+    /** @type {number | null} */
+    this.stoppedSince = null;
+    /** @type {Entry[]} */
+    this.events = [];
+    /**
+     * The values of the thought that comes next.
+     *
+     * @type {Fields | null}
+     */
+    this.thinks = null;
+    /**
+     * What it has delivered, the last one first.
+     *
+     * @type {Delivery[]}
+     */
+    this.history = [];
+    /**
+     * When it set out on this order.
+     *
+     * @type {number | null}
+     */
+    this.began = null;
+    /**
+     * The ways that were found blocked on it.
+     *
+     * @type {Detour[]}
+     */
+    this.detours = [];
+    /**
+     * Goods that wait because no way leads to them.
+     *
+     * @type {Set<string>}
+     */
+    this.unreachable = new Set();
+  }
+
+  /** Nothing has happened yet. */
+  forget() {
+    this.events = [];
+    this.thinks = null;
+    this.history = [];
+    this.began = null;
+    this.detours = [];
+    this.unreachable = new Set();
+  }
+
+  /**
+   * Keeps an event, a thought, a refusal or what was asked, by when it was: some are told later.
+   *
+   * @param {Entry} entry
+   */
+  happened(entry) {
+    const after = this.events.findLastIndex(({ at }) => at <= entry.at);
+    this.events.splice(after + 1, 0, entry);
+    if (this.events.length > ENTRIES) this.events.shift();
+  }
+
+  /**
+   * Takes over a state that has just come.
+   *
+   * @param {State} state
+   * @param {number} now
+   */
+  become(state, now) {
+    this.stoppedSince = state.stop_age_ms === undefined ? null : Date.now() - Number(state.stop_age_ms);
+    this.stray(state, now);
+    this.state = state;
+    this.stated = now;
+    this.remember(now);
+  }
+
+  /**
+   * Keeps where it was, and how far its wheels may have taken it since nobody knows.
+   *
+   * @param {State} state
+   * @param {number} now
+   */
+  stray(state, now) {
+    const { x_mm: x, y_mm: y, heading_deg: heading = 0, unsure_mm: unsure = 0 } = state;
+    if (x !== undefined) {
+      this.pose = { x: Number(x), y: Number(y), heading: Number(heading), unsure: Number(unsure) };
+      this.strayed = 0;
+    } else if (this.pose) {
+      this.strayed += this.mayHaveDriven(now, state);
+    }
+  }
+
+  /**
+   * How far it may have driven since its state last came, in mm, at the duties of that state or of another one.
+   *
+   * @param {number} now
+   * @param {State} [state]
+   * @returns {number}
+   */
+  mayHaveDriven(now, { left_duty: left = "0", right_duty: right = "0" } = this.state) {
+    const seconds = Math.max(0, now - this.stated) / 1_000;
+    return Math.max(Number(left), Number(right)) * MM_PER_DUTY * Math.min(seconds, DRIVES_ON_S);
+  }
+
+  /**
+   * Keeps what the strips and the trail show.
+   *
+   * @param {number} now
+   */
+  remember(now) {
+    this.total += 1;
+    const { state, latency } = this;
+    /** @param {keyof State} key */
+    const figure = (key) => (state[key] === undefined ? null : Number(state[key]));
+    const decivolts = figure("battery_dv");
+    this.past.push({
+      at: now,
+      x: figure("x_mm"),
+      y: figure("y_mm"),
+      line_error: figure("line_error"),
+      left_duty: figure("left_duty"),
+      right_duty: figure("right_duty"),
+      distance_cm: figure("distance_cm"),
+      battery: decivolts === null ? null : decivolts / 10,
+      path_p50: latency?.p50 ?? null,
+      path_p99: latency?.p99 ?? null,
+      lost: (figure("sensor_lost") ?? 0) + (figure("steering_lost") ?? 0) + (figure("bus_lost") ?? 0),
+    });
+    if (this.past.length > MOMENTS) this.past.splice(0, 200);
+  }
+
+  /**
+   * Milliseconds since the robot was last heard.
+   *
+   * @param {number} now
+   */
+  age(now) {
+    return now - this.heard;
+  }
+
+  /** @param {number} now */
+  isStale(now) {
+    return !this.connected || now - this.heard > STALE_MS || now - this.stated > STALE_MS;
+  }
+}
