@@ -8,7 +8,7 @@ const page = new URL("../page/", import.meta.url);
 const ids = new Map();
 for (const file of ["index.html", "screen.html"]) {
   const html = readFileSync(new URL(file, page), "utf8");
-  for (const [, tag, id] of html.matchAll(/<([a-z]+)\b[^>]*?\sid="([^"]+)"/g)) {
+  for (const [, tag, id] of html.matchAll(/<([a-z][a-z0-9]*)\b[^>]*?\sid="([^"]+)"/g)) {
     const other = ids.get(id);
     // Both pages share scripts, so one id is one kind of element.
     if (other && other !== tag) throw new Error(`${file}: #${id} is <${tag}>, and <${other}> on the other page`);

@@ -4,10 +4,10 @@ addEventListener("keydown", (event) => {
   const { key, repeat, target } = event;
   // The page's script says so once it listens itself (`stop.js`).
   if (repeat || document.documentElement.dataset.stops) return;
-  if (key !== "Escape" && (key !== " " || target?.matches?.("input, select, textarea"))) return;
+  if (key !== "Escape" && (key !== " " || (target instanceof Element && target.matches("input, select, textarea")))) return;
   event.preventDefault();
   const stop = document.querySelector("#stop");
-  stop?.form.requestSubmit(stop);
+  if (stop instanceof HTMLButtonElement) stop.form?.requestSubmit(stop);
 }, { capture: true });
 
 // The form says who presses, if the person at this browser has chosen a name (`link.js`).

@@ -1,8 +1,10 @@
 // Puts the page together: one link, one robot in view, everything drawn once a picture.
 
+/** @import { Robot } from "./station/robot.js" */
+
 import { Arm } from "./missions/arm.js";
 import { Asked, Where } from "./drive/ask.js";
-import { at } from "./parts/at.js";
+import { at, every } from "./parts/at.js";
 import { Bar } from "./bar/bar.js";
 import { choose, named, shown } from "./station/chosen.js";
 import { Driving } from "./drive/drive.js";
@@ -70,12 +72,17 @@ const line = new Line({
 }, link, robot);
 const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, (name) => {
   at("robot").value = name;
-  at("robot").onchange();
+  at("robot").dispatchEvent(new Event("change"));
 });
 const strips = new Strips(at("strips"));
 const notify = new Notify(link, at("notify"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
 
+/**
+ * Has the robot in view do something, and tells where one drives why not.
+ *
+ * @param {string} action
+ */
 async function act(action) {
   const shown = robot();
   if (!shown) return;
@@ -98,29 +105,32 @@ at("language").onclick = () => {
 };
 
 // Space is STOP, so a box is ticked by Enter.
-for (const box of document.querySelectorAll("[type=checkbox]")) {
+for (const box of every("[type=checkbox]", HTMLInputElement)) {
   box.addEventListener("keydown", (event) => event.key === "Enter" && !event.repeat && box.click());
 }
 
-for (const tab of document.querySelectorAll("[role=tab]")) {
+/** @type {Partial<Record<string, number>>} */
+const STEPS = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
+for (const tab of every("[role=tab]", HTMLButtonElement)) {
   tab.addEventListener("click", () => show(tab));
   tab.addEventListener("keydown", (event) => {
-    const tabs = [...document.querySelectorAll("[role=tab]:not([hidden])")];
-    const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+    const tabs = every("[role=tab]:not([hidden])", HTMLButtonElement);
+    const step = STEPS[event.key];
     if (!step || at("armed").checked) return;
-    const next = tabs[(tabs.indexOf(tab) + step + tabs.length) % tabs.length];
+    const next = tabs[(tabs.indexOf(tab) + step + tabs.length) % tabs.length] ?? tab;
     show(next);
     next.focus();
   });
 }
 
+/** @param {HTMLElement} tab */
 function show(tab) {
-  document.body.dataset.view = tab.getAttribute("aria-controls");
-  for (const other of document.querySelectorAll("[role=tab]")) {
+  document.body.dataset.view = tab.getAttribute("aria-controls") ?? "";
+  for (const other of every("[role=tab]", HTMLButtonElement)) {
     const chosen = other === tab;
-    other.setAttribute("aria-selected", chosen);
+    other.setAttribute("aria-selected", String(chosen));
     other.tabIndex = chosen ? 0 : -1;
-    at(other.getAttribute("aria-controls")).hidden = !chosen;
+    document.getElementById(other.getAttribute("aria-controls") ?? "")?.toggleAttribute("hidden", !chosen);
   }
   driving.letGo();
 }
@@ -128,15 +138,16 @@ function show(tab) {
 /** Words that change with the language or with who looks. */
 function words() {
   at("language").textContent = say("language");
-  for (const element of document.querySelectorAll(".driver-only")) element.disabled = !link.mayDrive;
+  for (const element of every(".driver-only", HTMLElement)) element.toggleAttribute("disabled", !link.mayDrive);
 }
 
 link.addEventListener("robots", () => {
   const list = at("robot");
   // One that is not here stays chosen: nobody takes its place unasked.
-  const names = new Set([...link.robots.keys(), ...(named() === null ? [] : [named()])]);
+  const wanted = named();
+  const names = new Set([...link.robots.keys(), ...(wanted === null ? [] : [wanted])]);
   list.replaceChildren(...[...names].sort().map((name) => new Option(name, name)));
-  list.value = robot()?.name ?? named() ?? "";
+  list.value = robot()?.name ?? wanted ?? "";
 });
 at("robot").onchange = () => {
   choose(at("robot").value);
@@ -163,8 +174,9 @@ const SHARE = 0.04;
 /** So long a picture has taken lately, in ms, all the browser's work for it included. */
 let cost = 5;
 let drawn = -Infinity;
+/** @type {number | null} */
 let due = null;
-let timer = null;
+let timer = 0;
 
 /** Draws in the browser's next picture. */
 function soon() {
@@ -194,6 +206,10 @@ function picture() {
   }
 }
 
+/**
+ * @param {Robot | null} shown
+ * @param {number} time
+ */
 function drawRest(shown, time) {
   const face = bar.draw(shown, time);
   map.draw(shown, [...link.robots.values()].filter((other) => other !== shown), time, face);

@@ -1,5 +1,8 @@
 // What state a robot is in, for who glances at it: one look for each, in the bar, on the map and on `/screen`.
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+
 import { at } from "../parts/at.js";
 import { named } from "../station/chosen.js";
 import { called, crossing, failure, reason, sentence } from "../words/sentences.js";
@@ -17,23 +20,51 @@ export const SHAPES = {
   drives: "M16 3a13 13 0 1 0 0 26a13 13 0 1 0 0-26M11 10l12 6-12 6 3-6z",
   none: "M16 3a13 13 0 1 0 0 26a13 13 0 1 0 0-26",
 };
-/** By the names of the robot: what holds it when it does not hear a board. */
-const HELD_BY = { sensor: "blind", steering: "unheard" };
+/** @typedef {keyof typeof SHAPES} Look */
+/**
+ * How a state looks.
+ *
+ * @typedef {object} Face
+ * @property {Look} look
+ * @property {string | null} said its sentence
+ * @property {string | null} [since] since when
+ * @property {string | null} [by] who has stopped it, or why
+ * @property {string | null} [proof] what shows that it stands
+ * @property {string | null} [more] what there is to add
+ * @property {string | null} [chip] what stands at the robot on the map
+ * @property {string | null} [remedy] the name of the remedy that is told
+ * @property {boolean} [isDeaf] whether STOP cannot reach it now
+ */
+
+/**
+ * By the names of the robot: what holds it when it does not hear a board.
+ *
+ * @type {["sensor" | "steering", string][]}
+ */
+const HELD_BY = [["sensor", "blind"], ["steering", "unheard"]];
 /** A page that has asked for a stop did so within this time of it, in ms. */
 const ASKED_MS = 10_000;
 
-/** An age in ms, in words that do not dance. */
+/**
+ * An age in ms, in words that do not dance.
+ *
+ * @param {number} ms
+ */
 export const age = (ms) => (ms < 60_000 ? `${Math.max(0, Math.floor(ms / 1_000))} s` : span(ms));
 
 /**
- * The look of a robot's state, its sentence, since when, what there is to add, what stands at the
- * robot on the map, and the name of the remedy that is told. What is old is not said as if it were so.
+ * How a robot's state looks. What is old is not said as if it were so.
+ *
+ * @param {Pick<Link, "open" | "me" | "tries" | "closed">} link
+ * @param {Robot | null} robot
+ * @param {number} now
+ * @returns {Face}
  */
 export function face(link, robot, now) {
   if (!link.open && link.me === null && link.tries === 0) return { look: "none", said: sentence("face_connecting") };
-  if (!link.open || (robot && (robot.speaks || !robot.connected) && robot.isStale(now))) {
+  if (!link.open && !robot) return { look: "unheard", said: lost(link) };
+  if (robot && (!link.open || ((robot.speaks || !robot.connected) && robot.isStale(now)))) {
     const why = link.open ? sentence("face_unheard", { robot: robot.name }) : lost(link);
-    if (!robot) return { look: "unheard", said: why };
     const old = [robot.heard, robot.stated].filter(Number.isFinite);
     const heard = old.length ? age(now - Math.min(...old)) : null;
     const before = does(robot).join(", ");
@@ -47,50 +78,77 @@ export function face(link, robot, now) {
       chip: heard && sentence("face_seen", { age: heard }),
     };
   }
-  if (!robot) return { look: "none", said: named() && link.me ? say("not_here", named()) : say("no_robot") };
+  const wanted = link.me && named();
+  if (!robot) return { look: "none", said: wanted ? say("not_here", wanted) : say("no_robot") };
   if (!robot.speaks) return { look: "none", said: say("plain") };
   const { phase, remedy, hold, x_mm: x } = robot.state;
   const boards = silent(robot);
   const why = failure({ ...robot.state, failure_node: robot.state.node });
   // Stop and mode stand beside it.
-  const end = ["none", "resume", "mode"].includes(remedy) ? null : sentence(`remedy_${remedy}`);
+  const end = remedy === undefined || ["none", "resume", "mode"].includes(remedy) ? null : sentence(`remedy_${remedy}`);
   const unknown = phase && x === undefined && phase !== "waiting_for_map";
   if (robot.state.stopped === "1") return { look: "stopped", ...stopped(link, robot, [...boards, why, end]), chip: sentence("face_stands"), remedy: end && remedy };
-  const look = boards.length || Object.values(HELD_BY).includes(hold) ? "board" : unknown ? "lost" : (why && phase !== "picking") || end || phase === "stuck" ? "needs" : idle(robot);
-  const board = Object.keys(HELD_BY).find((name) => hold === HELD_BY[name]);
-  const chip = { board: boards[0] ?? (board && unheard(board)), lost: say("place_unknown") }[look];
+  const [holder] = HELD_BY.find(([, held]) => hold === held) ?? [];
+  const needs = (why && phase !== "picking") || end || phase === "stuck";
+  const look = boards.length || holder ? "board" : unknown ? "lost" : needs ? "needs" : idle(robot);
+  const board = boards[0] ?? (holder && unheard(holder));
+  const chip = look === "board" ? board : look === "lost" ? say("place_unknown") : null;
   const [said, ...rest] = does(robot);
   return { look, said, more: sentences(...rest, ...boards, why, end), chip, remedy: end && remedy };
 }
 
-/** Each with a capital; those that are none left out. */
-const sentences = (...all) => all.filter(Boolean).map((one) => one[0].toUpperCase() + one.slice(1)).join(". ");
+/**
+ * Each with a capital; those that are none left out.
+ *
+ * @param {(string | null | undefined | false)[]} all
+ */
+const sentences = (...all) => all.flatMap((one) => (one ? [one.charAt(0).toUpperCase() + one.slice(1)] : [])).join(". ");
 
+/** @param {string} board */
 const unheard = (board) => say("board_lost", say(`board_${board}`));
 
+/**
+ * @param {Robot} robot
+ * @returns {Look}
+ */
 function idle({ state: { mode, phase } }) {
   if (mode === "manual") return "hand";
   return !phase || phase.startsWith("waiting") || phase === "picking" ? "waits" : "drives";
 }
 
-/** The boards that are not heard, unless the reason why it stands says so. */
+/**
+ * The boards that are not heard, unless the reason why it stands says so.
+ *
+ * @param {Robot} robot
+ */
 function silent({ state }) {
-  const boards = Object.keys(HELD_BY).filter((board) => state[`${board}_up`] === "0" && state.hold !== HELD_BY[board]);
-  return boards.map(unheard);
+  const boards = HELD_BY.filter(([board, held]) => state[`${board}_up`] === "0" && state.hold !== held);
+  return boards.map(([board]) => unheard(board));
 }
 
-/** Why a robot stands, and what it does, in words. */
+/**
+ * Why a robot stands, and what it does, in words.
+ *
+ * @param {Robot} robot
+ * @returns {[string, ...string[]]}
+ */
 function does({ state: { phase, next, product, hold, stopped: isStopped } }) {
   const act = phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? "";
   const held = hold && hold !== "none" && sentence(`hold_${hold}`);
   const isHalted = isStopped === "1";
   const fetches = product !== undefined && say(isHalted ? "was_to_fetch" : "fetches", product);
   const said = isHalted ? [say("stopped_short"), fetches] : [[act, fetches].filter(Boolean).join(", ")];
-  const [first, ...rest] = [!isHalted && held, ...said, isHalted && held].filter(Boolean);
-  return [first ?? "", ...rest];
+  const [first = "", ...rest] = [!isHalted && held, ...said, isHalted && held].flatMap((one) => one || []);
+  return [first, ...rest];
 }
 
-/** A latched stop: since when, by whom or why, and that the wheels stand. */
+/**
+ * A latched stop: since when, by whom or why, and that the wheels stand.
+ *
+ * @param {Pick<Link, "me">} link
+ * @param {Robot} robot
+ * @param {(string | null)[]} more
+ */
 function stopped(link, robot, more) {
   const { left_duty: left, right_duty: right, stood_ms: ms } = robot.state;
   const since = robot.stoppedSince === null ? null : sentence("face_ago", { age: age(Date.now() - robot.stoppedSince) });
@@ -101,21 +159,39 @@ function stopped(link, robot, more) {
   return { said, since, by: by ? sentence("face_by", { by }) : causeOf(robot), proof, more: sentences(...rest, ...more) };
 }
 
-/** The name of who has ordered a stop; null where nobody has. */
+/**
+ * The name of who has ordered a stop; null where nobody has.
+ *
+ * @param {Pick<Link, "me">} link
+ * @param {Robot} robot
+ */
 function stopper(link, { state: { stop_cause: cause, stop_by: by }, events, stoppedSince: since }) {
   if (cause !== "ordered") return null;
   if (by !== "comm") return by === "operator" ? say("by_operator") : by ?? null;
   const asked = events.findLast(({ kind, words, at }) => kind === "asked" && words[1] === "stop" && Math.abs(at - (since ?? at)) < ASKED_MS);
-  return asked ? called(asked.words[0], link.me) : say("by_comm");
+  return asked ? called(asked.words[0] ?? "", link.me) : say("by_comm");
 }
 
+/**
+ * Why a robot was stopped, in words.
+ *
+ * @param {Robot} robot
+ */
 export const causeOf = ({ state: { stop_cause: cause } }) => (cause !== "none" && sentence(`stop_cause_${cause}`)) || "";
 
-/** Why there is no connection. */
+/**
+ * Why there is no connection.
+ *
+ * @param {Pick<Link, "closed">} link
+ */
 const lost = (link) => (link.closed ? reason(link.closed) : say("lost"));
 
-
-/** Shows a state in the page that has these parts. What became of a stop stands in the place of the proof. */
+/**
+ * Shows a state in the page. What became of a stop stands in the place of the proof.
+ *
+ * @param {Face} face
+ * @param {Robot | null} robot
+ */
 export function show({ look, said, since, by, proof, more, isDeaf }, robot) {
   const { body } = document;
   body.dataset.look = look;
@@ -128,5 +204,5 @@ export function show({ look, said, since, by, proof, more, isDeaf }, robot) {
   put(at("more"), sentences([by, told].filter(Boolean).join("; "), more));
   const name = robot?.name ?? named() ?? "";
   put(at("stop-word"), say("stop"));
-  put(at("stop-whom"), isDeaf ? sentence("face_deaf", { robot: name }) : name);
+  put(at("stop-whom"), (isDeaf && sentence("face_deaf", { robot: name })) || name);
 }

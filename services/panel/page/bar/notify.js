@@ -1,19 +1,40 @@
 // Tells a person who looks elsewhere that a robot needs him: in the title of the page, and if he has asked for it
 // by a message of the browser and by a sound. Browsers show messages only for a page of this machine or over TLS.
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+/** @import { Face, Look } from "./face.js" */
+
 import { face } from "./face.js";
 
-/** The looks that only a person ends. */
+/**
+ * The looks that only a person ends.
+ *
+ * @type {Look[]}
+ */
 const NEEDS = ["board", "lost", "needs"];
 /** What has passed within this time is not told, in ms. */
 const PASSES_MS = 2_000;
 /** The sound: its pitch in Hz and its length in s. */
-const [PITCH, LENGTH] = [660, 0.3];
+const PITCH = 660;
+const LENGTH = 0.3;
 
 export class Notify {
+  /**
+   * @param {Link} link
+   * @param {HTMLInputElement} box
+   */
   constructor(link, box) {
-    Object.assign(this, { link, box, title: document.title, audio: null });
-    /** Since when each robot has needed somebody, by its name, and whether that has been told. */
+    this.link = link;
+    this.box = box;
+    this.title = document.title;
+    /** @type {AudioContext | null} */
+    this.audio = null;
+    /**
+     * Since when each robot has needed somebody, by its name, and whether that has been told.
+     *
+     * @type {Map<string, { since: number, isTold: boolean }>}
+     */
     this.needing = new Map();
     box.checked = localStorage.getItem("notify") === "yes";
     box.addEventListener("change", () => this.choose());
@@ -33,6 +54,7 @@ export class Notify {
     this.audio.resume();
   }
 
+  /** @param {number} now */
   draw(now) {
     const all = [...this.link.robots.values()].map((robot) => ({ robot, ...face(this.link, robot, now) }));
     const needy = all.filter(isNeedy);
@@ -42,12 +64,16 @@ export class Notify {
     this.needing = new Map(needy.map(({ robot: { name } }) => [name, before.get(name) ?? { since: now, isTold: false }]));
     for (const { robot, said, more } of needy) {
       const need = this.needing.get(robot.name);
-      if (need.isTold || now - need.since < PASSES_MS) continue;
+      if (!need || need.isTold || now - need.since < PASSES_MS) continue;
       need.isTold = true;
       if (this.box.checked) this.tell(robot.name, [said, more].filter(Boolean).join(". "));
     }
   }
 
+  /**
+   * @param {string} name
+   * @param {string} body
+   */
   tell(name, body) {
     this.sound();
     if (globalThis.Notification?.permission !== "granted") return;
@@ -67,7 +93,11 @@ export class Notify {
   }
 }
 
-/** Whether a robot waits for a person: to end what is wrong, or to pick goods up. */
+/**
+ * Whether a robot waits for a person: to end what is wrong, or to pick goods up.
+ *
+ * @param {Face & { robot: Robot }} shown
+ */
 function isNeedy({ look, robot: { state } }) {
   const isStoppedAlone = look === "stopped" && state.stop_cause !== undefined && state.stop_cause !== "ordered";
   return NEEDS.includes(look) || isStoppedAlone || (look === "waits" && state.phase === "picking" && state.pick === "manual");

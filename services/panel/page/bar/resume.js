@@ -1,5 +1,10 @@
 // Resume is held, so that nobody does it in passing. Each press ends in a resume or in a word why not.
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Words } from "../words/words.js" */
+/** @import { Robot } from "../station/robot.js" */
+/** @typedef {{ button: HTMLElement, said: HTMLElement }} Held A button that is held, and where it is told why not. */
+
 import { called, reason } from "../words/sentences.js";
 import { put, say } from "../words/words.js";
 
@@ -9,14 +14,25 @@ const HOLD_MS = 1_000;
 const PATIENCE_MS = 1_000;
 
 export class Resume {
-  /** `buttons` end the stop of `robot()` when they are held, each with its place for what there is to say. */
+  /**
+   * @param {Link} link
+   * @param {Held[]} buttons end the stop of `robot()` when they are held
+   * @param {() => Robot | null} robot
+   */
   constructor(link, buttons, robot) {
-    Object.assign(this, { link, buttons, robot });
-    /** The robot whose Resume is held, the stop that was shown when the hold began, which button, and the end of the hold. */
+    this.link = link;
+    this.buttons = buttons;
+    this.robot = robot;
+    /**
+     * The robot whose Resume is held, the stop that was shown when the hold began, which button, and the end of the hold.
+     *
+     * @type {{ robot: Robot, stop: string, one: Held, timer: number } | null}
+     */
     this.held = null;
     for (const one of buttons) this.listen(one);
   }
 
+  /** @param {Held} one */
   listen(one) {
     const { button } = one;
     button.addEventListener("pointerdown", (event) => {
@@ -35,6 +51,7 @@ export class Resume {
     });
   }
 
+  /** @param {Held} one */
   begin(one) {
     const robot = this.robot();
     if (this.held || robot?.state.stopped !== "1" || !robot.state.stop) return;
@@ -46,8 +63,13 @@ export class Resume {
     this.held = { robot, stop: robot.state.stop, one, timer };
   }
 
-  /** It has been held for long enough: what is in its way may pass until `latest`. */
+  /**
+   * It has been held for long enough: what is in its way may pass until `latest`.
+   *
+   * @param {number} latest
+   */
   async end(latest) {
+    if (!this.held) return;
     const { robot, stop, one } = this.held;
     const why = this.forbidden(robot) ?? this.notYet(robot);
     if (why && performance.now() < latest) {
@@ -60,23 +82,38 @@ export class Resume {
     put(one.said, answer.refused ? say("refused", reason(answer.refused)) : "");
   }
 
-  /** Ends the hold; why, if that is to be told. */
+  /**
+   * Ends the hold; why, if that is to be told.
+   *
+   * @param {Words | []} why
+   */
   letGo(...why) {
     if (!this.held) return;
     const { one, timer } = this.held;
     clearTimeout(timer);
     this.held = null;
     one.button.classList.remove("held");
-    put(one.said, why.length ? say(...why) : "");
+    const [word, ...values] = why;
+    put(one.said, word ? say(word, ...values) : "");
   }
 
-  /** Why this page may not end the stop, as words; null if it may. */
+  /**
+   * Why this page may not end the stop, as words; null if it may.
+   *
+   * @param {Robot} robot
+   * @returns {Words | null}
+   */
   forbidden(robot) {
     if (!this.link.mayDrive) return ["viewer"];
     return robot.driver && robot.driver !== this.link.me ? ["person", called(robot.driver)] : null;
   }
 
-  /** What is in the way for a moment, likewise. */
+  /**
+   * What is in the way for a moment, likewise.
+   *
+   * @param {Robot} robot
+   * @returns {Words | null}
+   */
   notYet(robot) {
     if (!this.link.open) return ["lost"];
     if (robot.isStale(performance.now())) return ["old"];
@@ -84,14 +121,15 @@ export class Resume {
     return Number(left) || Number(right) ? ["still_moves"] : null;
   }
 
+  /** @param {Robot | null} robot */
   draw(robot) {
     const { held } = this;
     if (held && robot !== held.robot) this.letGo();
-    else if (held && robot.state.stopped !== "1") this.letGo();
+    else if (held && held.robot.state.stopped !== "1") this.letGo();
     // What is held ends the stop that it was held for, and no newer one.
-    else if (held && robot.state.stop !== held.stop) this.letGo("stopped_again");
+    else if (held && held.robot.state.stop !== held.stop) this.letGo("stopped_again");
     for (const { button, said } of this.buttons) {
-      button.setAttribute("aria-disabled", robot?.state.stopped === "1" && this.forbidden(robot) !== null);
+      button.setAttribute("aria-disabled", String(robot?.state.stopped === "1" && this.forbidden(robot) !== null));
       if (robot?.state.stopped !== "1") put(said, "");
     }
   }

@@ -5,10 +5,17 @@
 //
 // Before this runs the form is the browser's, and is answered by a page (services/panel/src/stop.rs).
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+
 import { reason, sentence } from "../words/sentences.js";
 import { say } from "../words/words.js";
 
-/** Whether a person writes there: Space is a blank then. */
+/**
+ * Whether a person writes there: Space is a blank then.
+ *
+ * @param {EventTarget | null} element
+ */
 export function isText(element) {
   return element instanceof HTMLElement && (element.matches("input:not([type=checkbox], [type=radio], [type=file]), textarea") || element.isContentEditable);
 }
@@ -24,9 +31,18 @@ export class Stop {
   /**
    * The buttons of `form` stop the robots that they name, and `button` and the keys Esc and Space
    * `robot()`; `said` is where it is told. A stop calls `first`.
+   *
+   * @param {Link} link
+   * @param {{ form: HTMLFormElement, button: HTMLButtonElement, said: HTMLElement }} parts
+   * @param {() => Robot | null} robot
+   * @param {() => string | null} name the name in view, whether that robot is known or not
    */
   constructor(link, { form, button, said }, robot, name, first = () => {}) {
-    Object.assign(this, { link, form, said, robot, name, first });
+    this.link = link;
+    this.said = said;
+    this.robot = robot;
+    this.name = name;
+    this.first = first;
     this.pressed = -Infinity;
     for (const one of form.querySelectorAll("button")) {
       one.addEventListener("pointerdown", () => {
@@ -47,16 +63,22 @@ export class Stop {
     addEventListener("keyup", (event) => event.key === " " && this.isKey(event) && event.preventDefault(), { capture: true });
   }
 
+  /**
+   * @param {Element} one
+   * @param {HTMLButtonElement} button
+   */
   press(one, button) {
     if (one === button) this.stop();
     else this.stopAll();
   }
 
+  /** @param {KeyboardEvent} event */
   isKey({ key, target }) {
     // A button that is held, such as Resume, is held by Space.
-    return key === "Escape" || (key === " " && !isText(target) && !target.closest?.(".hold"));
+    return key === "Escape" || (key === " " && !isText(target) && !(target instanceof Element && target.closest(".hold")));
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
     if (!this.isKey(event)) return;
     event.preventDefault();
@@ -79,7 +101,7 @@ export class Stop {
     else if (answer.unsent) this.post([robot.name]);
     else if (answer.isUnknown) this.say("stop_unconfirmed");
     else if (!robot.connected) this.became(robot.name, "unheard");
-    else this.say("stop_refused", reason(answer.refused));
+    else this.say("stop_refused", reason(answer.refused ?? ""));
   }
 
   /** Stops every robot that the station knows. */
@@ -89,10 +111,14 @@ export class Stop {
     return this.post([]);
   }
 
-  /** The form by a request; without a name all are stopped. Until there is an answer `meanwhile` is said. */
+  /**
+   * The form by a request; without a name all are stopped. Until there is an answer `meanwhile` is said.
+   *
+   * @param {(string | null)[]} names
+   */
   async post(names, meanwhile = "sent") {
     this.say(meanwhile);
-    const body = new URLSearchParams([["name", localStorage.getItem("name") ?? ""], ...names.map((name) => ["robot", name ?? ""])]);
+    const body = new URLSearchParams([["name", localStorage.getItem("name") ?? ""], ...names.map((robot) => ["robot", robot ?? ""])]);
     let lines;
     try {
       const answer = await fetch("/stop", { method: "POST", body, headers: { accept: "text/plain" }, signal: AbortSignal.timeout(FORM_MS) });
@@ -100,24 +126,43 @@ export class Stop {
       lines = (await answer.text()).split("\n").filter(Boolean);
     } catch (error) {
       // One that nobody answers may have arrived.
-      return this.say(error.name === "TimeoutError" ? "stop_unconfirmed" : "stop_lost");
+      return this.say(error instanceof DOMException && error.name === "TimeoutError" ? "stop_unconfirmed" : "stop_lost");
     }
-    const words = lines.map((line) => became(...line.split(" ")));
+    const words = lines.map((line) => {
+      const [robot = "", word = "", ms] = line.split(" ");
+      return became(robot, word, ms);
+    });
     this.tell(words.join(". ") || say("no_robot"));
   }
 
+  /**
+   * @param {string} robot
+   * @param {string} word
+   * @param {number} [ms]
+   */
   became(robot, word, ms) {
     this.tell(became(robot, word, ms));
   }
 
+  /**
+   * @param {string | null} key
+   * @param {string[]} values
+   */
   say(key, ...values) {
     this.tell(key ? say(key, ...values) : "");
   }
 
+  /** @param {string} text */
   tell(text) {
     this.said.textContent = text;
   }
 }
 
-/** What became of a robot's stop, by the words of the panel. */
+/**
+ * What became of a robot's stop, by the words of the panel.
+ *
+ * @param {string} robot
+ * @param {string} word
+ * @param {string | number} [ms]
+ */
 const became = (robot, word, ms) => sentence(`became_${word}`, { robot, ms }) ?? word;

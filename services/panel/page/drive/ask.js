@@ -1,20 +1,44 @@
 // What the page asks a person: where the robot stands after it was driven by hand, and whether
 // somebody else may have the wheel. STOP and its keys work meanwhile: nothing here is in front of them.
 
-import { judge, wrong } from "../parts/fields.js";
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+
+import { field, judge, wrong } from "../parts/fields.js";
 import { called, reason } from "../words/sentences.js";
 import { put, say } from "../words/words.js";
 
-/** Which way a robot on the delivery corner looks into the warehouse. */
+/**
+ * Which way a robot on the delivery corner of this column looks into the warehouse.
+ *
+ * @param {number} x
+ */
 const inwards = (x) => (x === 0 ? "right" : "left");
 /** The ways to look, from 0 degrees on to the right. */
 const LOOKS = ["up", "right", "down", "left"];
 
 export class Where {
-  /** `then` is done once the robot knows where it stands. */
+  /**
+   * @param {Link} link
+   * @param {{ dialog: HTMLDialogElement, form: HTMLFormElement, said: HTMLElement, later: HTMLElement }} parts
+   * @param {() => Robot | null} robot
+   */
   constructor(link, parts, robot) {
-    Object.assign(this, { link, parts, robot, then: null });
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
+    /**
+     * What is done once the robot knows where it stands.
+     *
+     * @type {(() => void) | null}
+     */
+    this.then = null;
     const { form, later } = parts;
+    this.x = field(form, "x", HTMLInputElement);
+    this.y = field(form, "y", HTMLInputElement);
+    this.looks = field(form, "looks", HTMLSelectElement);
+    /** Whether it is at the delivery or on a crossing. */
+    this.at = field(form, "at", RadioNodeList);
     judge(form);
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -22,49 +46,63 @@ export class Where {
     });
     later.onclick = () => parts.dialog.close();
     // To name a crossing is to choose it.
-    for (const name of ["x", "y", "looks"]) form.elements[name].addEventListener("input", () => (form.elements.at.value = "crossing"));
+    for (const one of [this.x, this.y, this.looks]) one.addEventListener("input", () => (this.at.value = "crossing"));
   }
 
-  /** Whether a robot that has been driven by hand does not know where it stands. */
+  /**
+   * Whether a robot that has been driven by hand does not know where it stands.
+   *
+   * @param {Robot | null} robot
+   */
   isOpen(robot) {
     return Boolean(robot?.speaks && this.link.warehouse && robot.state.phase && robot.state.x_mm === undefined);
   }
 
-  /** Whether somebody is to say where a robot stands: then a crossing of the map can be pointed at. */
+  /**
+   * Whether somebody is to say where a robot stands: then a crossing of the map can be pointed at.
+   *
+   * @param {Robot | null} robot
+   */
   isWanted(robot) {
     return this.parts.dialog.open || this.isOpen(robot);
   }
 
-  /** The robot stands on a crossing that was pointed at; which way it looks, is asked. */
-  choose([x, y]) {
-    const { form, dialog } = this.parts;
-    if (!dialog.open) this.ask();
-    const { elements } = form;
-    [elements.at.value, elements.x.value, elements.y.value] = ["crossing", x, y];
+  /**
+   * The robot stands on a crossing that was pointed at; which way it looks, is asked.
+   *
+   * @param {string[]} crossing
+   */
+  choose([x = "", y = ""]) {
+    if (!this.parts.dialog.open) this.ask();
+    [this.at.value, this.x.value, this.y.value] = ["crossing", x, y];
     // At first as it looked when it was known last.
     const { heading } = this.robot()?.pose ?? {};
-    if (heading !== undefined) elements.looks.value = LOOKS[(Math.round(heading / 90) + 40) % 4];
-    elements.looks.focus();
+    if (heading !== undefined) this.looks.value = LOOKS[(Math.round(heading / 90) + 40) % 4] ?? "";
+    this.looks.focus();
   }
 
+  /** @param {(() => void) | null} then is done once the robot knows where it stands */
   ask(then = null) {
+    if (!this.link.warehouse) return;
     const [width, height] = this.link.warehouse.size;
-    const { form, dialog, said } = this.parts;
+    const { dialog, said } = this.parts;
     this.then = then;
-    [form.elements.x.max, form.elements.y.max] = [width, height];
+    [this.x.max, this.y.max] = [String(width), String(height)];
     put(said, "");
     if (!dialog.open) dialog.show();
-    form.elements.at[0].focus();
+    const [first] = this.at;
+    if (first instanceof HTMLElement) first.focus();
   }
 
   async answer() {
-    const { form, dialog, said } = this.parts;
+    const { dialog, said } = this.parts;
     const robot = this.robot();
-    if (!robot) return put(said, say("no_robot"));
-    const { at, x, y, looks } = form.elements;
+    const { warehouse } = this.link;
+    if (!robot || !warehouse) return put(said, say(robot ? "no_map" : "no_robot"));
+    const { at, x, y, looks } = this;
     const why = at.value === "crossing" ? wrong([x, y]) : null;
     if (why) return put(said, why);
-    const [cornerX, cornerY] = this.link.warehouse.delivery;
+    const [cornerX, cornerY] = warehouse.delivery;
     let action = `place ${x.value} ${y.value} ${looks.value}`;
     // A simulated robot is carried there; a real one has been.
     if (at.value === "delivery") action = robot.truth ? `place ${cornerX} ${cornerY} ${inwards(cornerX)}` : "reset";
@@ -77,15 +115,30 @@ export class Where {
 
 /** The driver is asked by whoever wants the wheel. */
 export class Asked {
+  /**
+   * @param {Link} link
+   * @param {Record<"box" | "said" | "give" | "keep", HTMLElement>} parts
+   * @param {() => Robot | null} robot
+   * @param {() => void} letGo ends what is held
+   */
   constructor(link, parts, robot, letGo) {
-    Object.assign(this, { link, parts, robot });
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
     parts.give.onclick = () => {
       letGo();
-      this.link.ask("free", this.robot().name);
+      this.answer("free");
     };
-    parts.keep.onclick = () => this.link.ask("keep", this.robot().name);
+    parts.keep.onclick = () => this.answer("keep");
   }
 
+  /** @param {"free" | "keep"} verb */
+  answer(verb) {
+    const robot = this.robot();
+    if (robot) this.link.ask(verb, robot.name);
+  }
+
+  /** @param {Robot | null} robot */
   draw(robot) {
     const { box, said } = this.parts;
     const who = robot?.driver && robot.driver === this.link.me ? robot.asks : null;

@@ -10,6 +10,10 @@
 // of the arm and the eighth turns are given once a press. Nothing cuts one of them short but the
 // command to stand: what is held ends before one, and nothing is held or begun while one is under way.
 
+/** @import { Answer, Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+/** @import { Words } from "../words/words.js" */
+
 import { Pads } from "./pads.js";
 import { reason } from "../words/sentences.js";
 import { isText } from "../bar/stop.js";
@@ -21,7 +25,15 @@ const STAND = 1;
 /** Unsent bytes beyond which nothing more is given. */
 const BACKLOG = 2_000;
 
-/** What is held: code of the wheels, word, keys. */
+/** @typedef {[number, string, string[]]} Key A code of the wheels, its word, and the keys that say it. */
+/** @typedef {string | Element} Source The key, the stick or the button of a pointer that holds something. */
+/** @typedef {{ code: number, source: Source, button: Element | null, robot: Robot }} Hold */
+
+/**
+ * What is held.
+ *
+ * @type {Key[]}
+ */
 const HELD = [
   [2, "forward", ["ArrowUp"]],
   [4, "backward", ["ArrowDown"]],
@@ -30,7 +42,11 @@ const HELD = [
   [3, "follow_forward", []],
   [5, "follow_back", []],
 ];
-/** What runs once. */
+/**
+ * What runs once.
+ *
+ * @type {Key[]}
+ */
 const ONCE = [
   [8, "left_diag", ["PageUp"]],
   [9, "right_diag", ["PageDown"]],
@@ -38,7 +54,11 @@ const ONCE = [
 ];
 /** The buttons of the wheels, row by row. */
 const PAD = ["left_diag", "forward", "right_diag", "left", "stand", "right", "follow_back", "backward", "follow_forward"];
-/** One step of the arm. */
+/**
+ * One step of the arm: its code, word and keys.
+ *
+ * @type {[string, string, string[]][]}
+ */
 const STEPS = [
   ["F1", "clockwise", ["1"]],
   ["F2", "counterclockwise", ["2"]],
@@ -52,22 +72,52 @@ const STEPS = [
   ["FA", "release", [".", "\u00f7"]],
 ];
 
-/** Keys whose names are long, as they are printed on keyboards. */
+/**
+ * Keys whose names are long, as they are printed on keyboards.
+ *
+ * @type {Record<string, string>}
+ */
 const SIGNS = { ArrowUp: "\u2191", ArrowDown: "\u2193", ArrowLeft: "\u2190", ArrowRight: "\u2192", PageUp: "PgUp", PageDown: "PgDn" };
 
 export class Driving {
+  /**
+   * @param {Link} link
+   * @param {{ armed: HTMLInputElement } & Record<"said" | "pad" | "arm" | "resume", HTMLElement>} parts
+   * @param {() => Robot | null} robot
+   * @param {() => number} now
+   */
   constructor(link, parts, robot, now) {
     this.link = link;
     this.parts = parts;
     this.robot = robot;
     this.now = now;
-    /** What is held: code, the key, pointer or stick that holds it, its button, and the robot. */
+    /**
+     * What is held now.
+     *
+     * @type {Hold | null}
+     */
     this.held = null;
-    /** What was held before that and still is, the newest last. */
+    /**
+     * What was held before that and still is, the newest last.
+     *
+     * @type {Hold[]}
+     */
     this.older = [];
-    this.timer = null;
-    /** The robot that a step or a turn is under way on. */
+    this.timer = 0;
+    /**
+     * The robot that a step or a turn is under way on.
+     *
+     * @type {Robot | null}
+     */
     this.step = null;
+    /** Whether what is told was refused because of a stop. */
+    this.isOfStop = false;
+    /**
+     * What the gamepads say.
+     *
+     * @type {number | null}
+     */
+    this.padCode = null;
     this.gamepads = new Pads(now);
     this.buttons();
     this.keys();
@@ -79,18 +129,30 @@ export class Driving {
     return this.held !== null;
   }
 
+  /**
+   * @param {string | null} key
+   * @param {(string | number | null | undefined)[]} values
+   */
   tell(key, ...values) {
     this.parts.said.textContent = key ? say(key, ...values) : "";
     this.isOfStop = false;
   }
 
-  /** Tells why the robot has refused; a stop is ended by the button beside it. */
+  /**
+   * Tells why the robot has refused; a stop is ended by the button beside it.
+   *
+   * @param {string} refused
+   */
   refuse(refused) {
     this.tell("refused", reason(refused));
     this.isOfStop = this.robot()?.state.stopped === "1";
   }
 
-  /** Why nothing may be driven now, as a word; null if it may. */
+  /**
+   * Why nothing may be driven now; null if it may.
+   *
+   * @returns {Words | null}
+   */
   objection() {
     const robot = this.robot();
     if (!robot || !this.link.open) return ["lost"];
@@ -108,12 +170,19 @@ export class Driving {
     this.parts.resume.hidden = !this.isOfStop;
   }
 
-  /** `source` is the key, pointer or stick that holds it; a button's hold ends with its focus, too. */
+  /**
+   * Holds a code of the wheels; a button's hold ends with its focus, too.
+   *
+   * @param {number} code
+   * @param {Source} source
+   * @param {Element | null} button
+   */
   hold(code, source, button = null) {
     if (this.held?.source === source || this.older.some((other) => other.source === source)) return;
     const why = this.objection();
     if (why) return this.tell(...why);
     const robot = this.robot();
+    if (!robot) return;
     if (this.step === robot) return this.tell("wait");
     this.tell(null);
     if (this.held) this.older.push(this.held);
@@ -124,7 +193,7 @@ export class Driving {
   }
 
   async renew() {
-    if (this.held.source === "pad") this.pads();
+    if (this.held?.source === "pad") this.pads();
     if (!this.held) return;
     const { code, robot } = this.held;
     const why = this.objection();
@@ -139,7 +208,11 @@ export class Driving {
     }
   }
 
-  /** Ends what is held, and what was held before it; tells why, if there is more to it than a hand. */
+  /**
+   * Ends what is held, and what was held before it; tells why, if there is more to it than a hand.
+   *
+   * @param {Words | []} why
+   */
   letGo(...why) {
     if (!this.held) return;
     clearInterval(this.timer);
@@ -148,15 +221,21 @@ export class Driving {
     this.older = [];
     for (const button of document.querySelectorAll("#pad .down")) button.classList.remove("down");
     if (this.link.open) this.link.act(robot, `drive ${STAND}`);
-    if (why.length) this.tell(...why);
+    const [word, ...values] = why;
+    if (word) this.tell(word, ...values);
   }
 
-  /** A key, pointer or stick is let go: what was held before it counts again. */
+  /**
+   * A key, pointer or stick is let go: what was held before it counts again.
+   *
+   * @param {Source} source
+   */
   release(source) {
     if (this.held?.source === source) {
-      if (!this.older.length) return this.letGo();
+      const before = this.older.pop();
+      if (!before) return this.letGo();
       this.held.button?.classList.remove("down");
-      this.held = this.older.pop();
+      this.held = before;
       this.renew();
       return;
     }
@@ -165,10 +244,16 @@ export class Driving {
     this.older = this.older.filter((other) => other !== ended);
   }
 
+  /**
+   * Has the robot do something once.
+   *
+   * @param {string} action
+   */
   async once(action) {
     const why = this.objection();
     if (why) return this.tell(...why);
     const robot = this.robot();
+    if (!robot) return;
     const isStand = action === `drive ${STAND}`;
     if (!isStand && this.step === robot) return this.tell("wait");
     const wasHeld = this.held !== null;
@@ -183,6 +268,7 @@ export class Driving {
     this.hear(answer);
   }
 
+  /** @param {Answer} answer */
   hear({ refused }) {
     if (refused) this.refuse(refused);
   }
@@ -192,15 +278,19 @@ export class Driving {
     for (const name of PAD) {
       const held = HELD.find(([, word]) => word === name);
       const once = ONCE.find(([, word]) => word === name);
-      if (held) this.heldButton(pad, ...held);
-      else addButton(pad, name, once[2]).addEventListener("click", () => this.once(`drive ${once[0]}`));
+      if (held) this.heldButton(pad, held);
+      if (once) addButton(pad, name, once[2]).addEventListener("click", () => this.once(`drive ${once[0]}`));
     }
     for (const [code, word, keys] of STEPS) {
       addButton(arm, word, keys).addEventListener("click", () => this.once(`arm ${code}`));
     }
   }
 
-  heldButton(pad, code, word, keys) {
+  /**
+   * @param {HTMLElement} pad
+   * @param {Key} key
+   */
+  heldButton(pad, [code, word, keys]) {
     const button = addButton(pad, word, keys);
     button.addEventListener("pointerdown", (event) => {
       button.setPointerCapture(event.pointerId);
@@ -218,6 +308,11 @@ export class Driving {
   }
 
   keys() {
+    /**
+     * @template {[unknown, string, string[]]} Row
+     * @param {Row[]} table
+     * @param {string} key
+     */
     const find = (table, key) => table.find(([, , keys]) => keys.includes(key));
     addEventListener("keydown", (event) => {
       // Another window may have the key's end.
@@ -234,7 +329,7 @@ export class Driving {
       if (event.repeat) return;
       if (held) this.hold(held[0], place(event));
       else if (once) this.once(`drive ${once[0]}`);
-      else this.once(`arm ${step[0]}`);
+      else if (step) this.once(`arm ${step[0]}`);
     });
     addEventListener("keyup", (event) => this.release(place(event)));
   }
@@ -267,25 +362,39 @@ export class Driving {
   }
 }
 
-/** Whether keys belong to a field: to write, or to choose with arrows. */
+/**
+ * Whether keys belong to a field: to write, or to choose with arrows.
+ *
+ * @param {EventTarget | null} element
+ */
 function ownsKeys(element) {
   return isText(element) || (element instanceof HTMLElement && element.closest("select, [type=radio], [type=file]") !== null);
 }
 
-/** Which key it is, however it is called: with or without Shift and Num Lock the keypad's have two names. */
+/**
+ * Which key it is, however it is called: with or without Shift and Num Lock the keypad's have two names.
+ *
+ * @param {KeyboardEvent} event
+ */
 function place({ code, key }) {
   return code || key;
 }
 
+/**
+ * @param {HTMLElement} parent
+ * @param {string} word
+ * @param {string[]} keys
+ */
 function addButton(parent, word, keys) {
   const button = document.createElement("button");
   button.type = "button";
   button.dataset.word = word;
   button.id = `${parent.id}-${word}`;
   button.textContent = say(word);
-  if (keys.length) {
-    button.setAttribute("aria-keyshortcuts", keys[0]);
-    button.dataset.key = SIGNS[keys[0]] ?? keys[0];
+  const [key] = keys;
+  if (key) {
+    button.setAttribute("aria-keyshortcuts", key);
+    button.dataset.key = SIGNS[key] ?? key;
   }
   // A key that repeats is one press.
   button.addEventListener("keydown", (event) => event.repeat && event.key === "Enter" && event.preventDefault());

@@ -1,16 +1,33 @@
 // Taking a robot by hand needs the wheel. One that is on its way is not taken by a hand that slipped: the page
 // asks first, and takes it when the time is over unless it is left to the robot.
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+
 import { say, put } from "../words/words.js";
 
 /** How long there is to think, in ms. */
 const THINK_MS = 5_000;
 
 export class ByHand {
-  /** `take` has the robot driven by hand, `tell` says why not. */
+  /**
+   * @param {Link} link
+   * @param {Record<"ask" | "box" | "said" | "take" | "leave", HTMLElement>} parts
+   * @param {() => Robot | null} robot
+   * @param {() => void} take has the robot driven by hand
+   * @param {(word: string | null) => void} tell says why not
+   */
   constructor(link, parts, robot, take, tell) {
-    Object.assign(this, { link, parts, robot, take, tell });
-    /** The robot that is asked about, and when it is taken. */
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
+    this.take = take;
+    this.tell = tell;
+    /**
+     * The robot that is asked about, and when it is taken.
+     *
+     * @type {{ robot: Robot, product: string, at: number } | null}
+     */
     this.asked = null;
     parts.ask.onclick = () => this.ask();
     parts.take.onclick = () => this.now();
@@ -40,6 +57,7 @@ export class ByHand {
     this.parts.box.hidden = true;
   }
 
+  /** @param {Robot | null} robot */
   draw(robot) {
     const { asked, parts } = this;
     if (!asked) return;

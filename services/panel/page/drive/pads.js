@@ -17,7 +17,17 @@ const LOOK_MS = 500;
 const FROZEN_MS = 300;
 /** How far a stick is bent that says something. */
 const BENT = 0.5;
-/** Buttons of the cross, and the axes, that say which code of the wheels; the first that is pressed counts. */
+
+/** @typedef {{ id: string, came: number, since: number, rested: boolean }} Known What is known of an entry. */
+/** @typedef {{ pad: Gamepad, index: number }} There An entry and its place in the browser's list. */
+
+
+/**
+ * Codes of the wheels, each with the button of the cross, and the axis and its way, that say it; the first that is
+ * pressed counts.
+ *
+ * @type {[number, number, number, number][]}
+ */
 const CODES = [
   [2, 12, 1, -1],
   [4, 13, 1, 1],
@@ -25,34 +35,54 @@ const CODES = [
   [7, 15, 0, 1],
 ];
 
-/** The code of the wheels that an entry says, or null. */
+/**
+ * The code of the wheels that an entry says, or null.
+ *
+ * @param {Pick<Gamepad, "axes" | "buttons">} pad
+ */
 function code({ axes, buttons }) {
-  const says = ([, button, axis, way]) => axes[axis] * way > BENT || buttons[button]?.pressed;
-  return CODES.find(says)?.[0] ?? null;
+  const found = CODES.find(([, button, axis, way]) => (axes[axis] ?? 0) * way > BENT || buttons[button]?.pressed);
+  return found?.[0] ?? null;
 }
 
 export class Pads {
+  /** @param {() => number} now */
   constructor(now) {
     this.now = now;
-    this.forget();
+    /**
+     * By its place in the browser's list: its pad, when it came, and whether it was seen at rest.
+     *
+     * @type {Map<number, Known>}
+     */
+    this.known = new Map();
+    this.came = 0;
+    this.since = now();
+    /**
+     * The entry that says something, by its place.
+     *
+     * @type {number | null}
+     */
+    this.speaks = null;
     addEventListener("gamepadconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
     addEventListener("gamepaddisconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
   }
 
   /** Each entry is new again. */
   forget() {
-    /** By its place in the browser's list: its pad, when it came, and whether it was seen at rest. */
-    this.known = new Map();
+    this.known.clear();
     this.came = 0;
     this.since = this.now();
-    /** The entry that says something, by its place. */
     this.speaks = null;
   }
 
-  /** The code of the wheels that is held on a pad, or null. */
+  /**
+   * The code of the wheels that is held on a pad, or null.
+   *
+   * @returns {number | null}
+   */
   read() {
     const all = [...(navigator.getGamepads?.() ?? [])];
-    const there = all.map((pad, index) => ({ pad, index })).filter(({ pad }) => pad?.mapping === "standard" && pad.connected !== false);
+    const there = all.flatMap((pad, index) => (pad?.mapping === "standard" && pad.connected !== false ? [{ pad, index }] : []));
     for (const index of this.known.keys()) {
       if (!there.some((one) => one.index === index)) this.known.delete(index);
     }
@@ -62,11 +92,16 @@ export class Pads {
     // Who speaks goes on speaking; another pad does not talk into it.
     const speaker = counts.find(({ index }) => index === this.speaks) ?? counts.find(({ pad }) => code(pad));
     const said = speaker ? code(speaker.pad) : null;
-    this.speaks = said ? speaker.index : null;
+    this.speaks = said === null ? null : speaker?.index ?? null;
     return said;
   }
 
-  /** Learns of an entry, and whether it rests. */
+  /**
+   * Learns of an entry, and whether it rests.
+   *
+   * @param {Gamepad} pad
+   * @param {number} index
+   */
   meet(pad, index) {
     let known = this.known.get(index);
     if (!known || known.id !== pad.id) {
@@ -77,11 +112,20 @@ export class Pads {
     if (code(pad) === null && isLookedAt) known.rested = true;
   }
 
+  /**
+   * Whether what an entry says counts; `newest` is when the last news of all came.
+   *
+   * @param {Gamepad} pad
+   * @param {number} index
+   * @param {number} newest
+   * @param {There[]} there
+   */
   isBelieved(pad, index, newest, there) {
     const known = this.known.get(index);
-    const isReplaced = there.some((other) => {
-      const { id, came } = this.known.get(other.index);
-      return id === known.id && came > known.came;
+    if (!known) return false;
+    const isReplaced = there.some((one) => {
+      const other = this.known.get(one.index);
+      return other && other.id === known.id && other.came > known.came;
     });
     const isFrozen = code(pad) !== null && newest - (pad.timestamp ?? newest) > FROZEN_MS;
     if (isReplaced || isFrozen) known.rested = false;

@@ -1,5 +1,9 @@
 // All robots of the station at a glance, where there are two or more: who needs a person comes first.
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+/** @import { Face } from "../bar/face.js" */
+
 import { face, SHAPES } from "../bar/face.js";
 import { make } from "../parts/svg.js";
 import { decimal, put, say } from "../words/words.js";
@@ -7,51 +11,75 @@ import { decimal, put, say } from "../words/words.js";
 /** The looks, the gravest first. */
 const GRAVITY = Object.keys(SHAPES);
 
+/** @typedef {{ item: HTMLElement, button: HTMLButtonElement, shape: Element } & Record<"name" | "said" | "more", HTMLElement>} Row */
+
 export class Fleet {
-  /** `choose` is called with the name of the robot that is to be shown. */
+  /**
+   * @param {Link} link
+   * @param {{ tab: HTMLElement, list: HTMLElement }} parts
+   * @param {(name: string) => void} choose is called with the name of the robot that is to be shown
+   */
   constructor(link, { tab, list }, choose) {
-    Object.assign(this, { link, tab, list, choose });
+    this.link = link;
+    this.tab = tab;
+    this.list = list;
+    this.choose = choose;
+    /** @type {Map<string, Row>} */
     this.rows = new Map();
   }
 
+  /**
+   * @param {Robot | null} shown
+   * @param {number} now
+   */
   draw(shown, now) {
     const robots = [...this.link.robots.values()];
     this.tab.hidden = robots.length < 2;
     if (this.tab.hidden) return;
     const states = robots.map((robot) => ({ robot, state: face(this.link, robot, now) }));
+    /** @param {{ state: Face }} one */
     const grave = ({ state }) => GRAVITY.indexOf(state.look);
     states.sort((one, other) => grave(one) - grave(other) || one.robot.name.localeCompare(other.robot.name));
     states.forEach(({ robot, state }, place) => {
       const row = this.row(robot);
       // A row that stays in its place keeps the reader's focus.
-      if (this.list.children[place] !== row) this.list.insertBefore(row, this.list.children[place] ?? null);
-      const button = row.firstElementChild;
-      const [shape, name, said, more] = button.children;
-      button.setAttribute("aria-pressed", robot === shown);
+      if (this.list.children[place] !== row.item) this.list.insertBefore(row.item, this.list.children[place] ?? null);
+      const { button, shape, name, said, more } = row;
+      button.setAttribute("aria-pressed", String(robot === shown));
       button.dataset.look = state.look;
-      shape.firstElementChild.setAttribute("d", SHAPES[state.look]);
+      shape.setAttribute("d", SHAPES[state.look]);
       put(name, robot.name);
       put(said, state.said ?? "");
       put(more, [state.since, state.more, ...figures(robot)].filter(Boolean).join(" \u00b7 "));
     });
   }
 
+  /**
+   * @param {Robot} robot
+   * @returns {Row}
+   */
   row(robot) {
-    let row = this.rows.get(robot.name);
-    if (row) return row;
-    row = document.createElement("li");
+    const known = this.rows.get(robot.name);
+    if (known) return known;
+    const item = document.createElement("li");
     const button = document.createElement("button");
     button.type = "button";
     button.onclick = () => this.choose(robot.name);
-    make("path", {}, make("svg", { viewBox: "0 0 32 32", "aria-hidden": "true" }, button));
-    for (const part of ["strong", "span", "small"]) button.append(document.createElement(part));
-    row.append(button);
+    const shape = make("path", {}, make("svg", { viewBox: "0 0 32 32", "aria-hidden": "true" }, button));
+    const [name, said, more] = [document.createElement("strong"), document.createElement("span"), document.createElement("small")];
+    button.append(name, said, more);
+    item.append(button);
+    const row = { item, button, shape, name, said, more };
     this.rows.set(robot.name, row);
     return row;
   }
 }
 
-/** Battery and orders. */
+/**
+ * Battery and orders.
+ *
+ * @param {Robot} robot
+ */
 function figures({ state: { battery_dv: decivolts }, queue }) {
   const volts = decivolts === undefined ? "" : say("volts", decimal(Number(decivolts) / 10));
   return [volts, queue.length ? say("orders_wait", queue.length) : ""];

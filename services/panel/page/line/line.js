@@ -1,7 +1,11 @@
 // The line under the robot: the calibration of its sensors as guided steps, and the gains of the
 // control that follows it.
 
-import { judge, wrong } from "../parts/fields.js";
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot, Sensor } from "../station/robot.js" */
+/** @typedef {[string, string]} Gains On the error and on its change. */
+
+import { field, judge, wrong } from "../parts/fields.js";
 import { reason } from "../words/sentences.js";
 import { SENSORS, sensors } from "../signals/strips.js";
 import { put, say } from "../words/words.js";
@@ -10,24 +14,38 @@ import { put, say } from "../words/words.js";
 const MOST = 255;
 
 export class Line {
+  /**
+   * @param {{ gains: HTMLFormElement, calibrate: HTMLButtonElement }
+   *   & Record<"gainsNow" | "gainsBack" | "said" | "steps" | "calibrationSaid" | "sensors", HTMLElement>} parts
+   * @param {Link} link
+   * @param {() => Robot | null} robot
+   */
   constructor(parts, link, robot) {
-    Object.assign(this, { parts, link, robot });
-    /** The gains in force, those before the last change, and whether others are being typed. */
+    this.parts = parts;
+    this.link = link;
+    this.robot = robot;
+    this.p = field(parts.gains, "p", HTMLInputElement);
+    this.d = field(parts.gains, "d", HTMLInputElement);
+    /**
+     * The gains in force, those before the last change, and whether others are being typed.
+     *
+     * @type {Gains | null}
+     */
     this.gainsNow = null;
+    /** @type {Gains | null} */
     this.gainsBefore = null;
     this.gainsTyped = false;
     judge(parts.gains);
     parts.gains.addEventListener("submit", (event) => {
       event.preventDefault();
-      const { p, d } = parts.gains.elements;
-      const why = wrong([p, d]);
+      const why = wrong([this.p, this.d]);
       if (why) put(parts.said, why);
-      else this.setGains([p.value, d.value]);
+      else this.setGains([this.p.value, this.d.value]);
     });
     parts.gains.addEventListener("input", () => (this.gainsTyped = true));
     parts.gainsBack.onclick = () => {
       this.gainsTyped = false;
-      this.setGains(this.gainsBefore);
+      if (this.gainsBefore) this.setGains(this.gainsBefore);
     };
     this.bars = Array.from({ length: SENSORS }, () => new SensorBar(parts.sensors));
     parts.calibrate.onclick = () => this.calibrate();
@@ -36,6 +54,7 @@ export class Line {
   /** Step by step: put it over tape, press and move it, read what came of it. */
   async calibrate() {
     const { calibrate, steps, calibrationSaid } = this.parts;
+    /** @param {number} step */
     const at = (step) => [...steps.children].forEach((line, index) => line.toggleAttribute("aria-current", index === step));
     const robot = this.robot();
     if (robot) robot.sensors = null;
@@ -48,7 +67,11 @@ export class Line {
     calibrate.disabled = false;
   }
 
-  /** The gains in force stand in the fields, unless somebody types there. */
+  /**
+   * The gains in force stand in the fields, unless somebody types there.
+   *
+   * @param {Robot | null} robot
+   */
   draw(robot) {
     this.drawSensors(robot);
     const { gain_p: p, gain_d: d } = robot?.state ?? {};
@@ -57,11 +80,14 @@ export class Line {
     put(this.parts.gainsBack, this.gainsBefore ? say("put_back", ...this.gainsBefore) : "");
     this.parts.gainsBack.hidden = !this.gainsBefore;
     if (this.gainsTyped || !this.gainsNow) return;
-    const { elements } = this.parts.gains;
-    [elements.p.value, elements.d.value] = this.gainsNow;
+    [this.p.value, this.d.value] = this.gainsNow;
   }
 
-  /** What the sensors see now, and what they have read in the calibration that runs or ran last. */
+  /**
+   * What the sensors see now, and what they have read in the calibration that runs or ran last.
+   *
+   * @param {Robot | null} robot
+   */
   drawSensors(robot) {
     const bits = sensors(robot?.state);
     const read = robot?.sensors;
@@ -74,6 +100,7 @@ export class Line {
     if (row.getAttribute("aria-label") !== words) row.setAttribute("aria-label", words);
   }
 
+  /** @param {Gains} gains */
   async setGains([p, d]) {
     const before = this.gainsNow;
     const robot = this.robot();
@@ -82,14 +109,18 @@ export class Line {
     if (answer.refused) return;
     this.gainsBefore = before;
     // Somebody may be typing others by now.
-    const { elements } = this.parts.gains;
-    if (elements.p.value === p && elements.d.value === d) this.gainsTyped = false;
+    if (this.p.value === p && this.d.value === d) this.gainsTyped = false;
   }
 }
 
 /** One sensor: its reading as a mark on a scale, what it has read so far as a stretch of it. */
 class SensorBar {
+  /** @param {HTMLElement} parent */
   constructor(parent) {
+    /**
+     * @param {HTMLElement} inside
+     * @param {string} name
+     */
     const add = (inside, name) => inside.appendChild(Object.assign(document.createElement("span"), { className: name }));
     this.column = add(parent, "sensor");
     this.scale = add(this.column, "scale");
@@ -98,11 +129,16 @@ class SensorBar {
     this.value = add(this.column, "value");
   }
 
+  /**
+   * @param {string | undefined} bit
+   * @param {Sensor | undefined} read
+   */
   draw(bit, read) {
     this.column.classList.toggle("on", bit === "1");
     this.column.classList.toggle("both", Boolean(read?.both));
     this.column.classList.toggle("unread", !read);
     const { reading = 0, lowest = 0, highest = 0 } = read ?? {};
+    /** @param {number} value */
     const share = (value) => `${((value / MOST) * 100).toFixed(1)}%`;
     this.mark.style.bottom = share(reading);
     this.stretch.style.bottom = share(lowest);

@@ -1,6 +1,11 @@
 // The hand on the map. A pointer, a finger or the keys pan and zoom it, and mean a thing on it: the tip says what that
 // is and what a click or Enter does there. The same words stand for all of them (offers.js), so no tip is wrong.
 
+/** @import { Point, Target } from "./grid.js" */
+/** @import { Box } from "./labels.js" */
+/** @import { WarehouseMap } from "./map.js" */
+/** @import { Offer } from "./offers.js" */
+
 import { meant, nearest, nextTo } from "./grid.js";
 import { meets } from "./labels.js";
 import { put, say } from "../words/words.js";
@@ -11,15 +16,35 @@ const STILL_PX = 5;
 const TWICE_MS = 400;
 /** How far the tip stays from what it is about, in pixels. */
 const OFF_PX = 16;
+/** @type {Record<string, Point>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Aim {
-  /** `offers` says what a thing is and does; `isArmed`, whether the arrows drive. */
+  /**
+   * @param {WarehouseMap} map
+   * @param {object} hand
+   * @param {HTMLElement} hand.tip
+   * @param {(target: Target | null) => Offer} hand.offers says what a thing is and does
+   * @param {() => boolean} hand.isArmed whether the arrows drive
+   */
   constructor(map, { tip, offers, isArmed }) {
-    Object.assign(this, { map, tip, offers, isArmed });
-    /** What pointer and keys mean now. */
+    this.map = map;
+    this.tip = tip;
+    this.offers = offers;
+    this.isArmed = isArmed;
+    /**
+     * What the pointer means now.
+     *
+     * @type {Target | null}
+     */
     this.pointed = null;
+    /**
+     * What the keys mean.
+     *
+     * @type {Target | null}
+     */
     this.chosen = null;
+    /** @type {{ id: string | null, at: number }} */
     this.clicked = { id: null, at: -Infinity };
     this.gestures(map.svg);
     map.svg.addEventListener("keydown", (event) => this.key(event));
@@ -27,14 +52,21 @@ export class Aim {
     map.svg.addEventListener("blur", () => this.draw());
   }
 
-  /** Drag to pan, wheel or two fingers to zoom; a click acts. */
+  /**
+   * Drag to pan, wheel or two fingers to zoom; a click acts.
+   *
+   * @param {SVGElement} svg
+   */
   gestures(svg) {
+    /** @type {Point | null} */
     let from = null;
     let moved = 0;
     const { map } = this;
+    /** @type {Map<number, PointerEvent>} */
     const fingers = new Map();
     const apart = () => {
       const [a, b] = [...fingers.values()];
+      if (!a || !b) return { far: 0, clientX: 0, clientY: 0 };
       return { far: Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY), clientX: (a.clientX + b.clientX) / 2, clientY: (a.clientY + b.clientY) / 2 };
     };
     svg.addEventListener("pointerdown", (event) => {
@@ -75,17 +107,23 @@ export class Aim {
     }, { passive: false });
   }
 
+  /** @param {PointerEvent} event */
   at(event) {
     const [x, y] = this.map.point(event);
     return meant([x, -y], this.map.scene);
   }
 
+  /** @param {Target | null} target */
   point(target) {
     if (this.pointed?.id === target?.id && this.pointed?.kind === target?.kind) return;
     this.pointed = target;
     this.draw();
   }
 
+  /**
+   * @param {Target | null} target
+   * @param {number} time
+   */
   click(target, time) {
     const id = target ? `${target.kind} ${target.id}` : "";
     if (this.clicked.id === id && time - this.clicked.at < TWICE_MS) return;
@@ -93,7 +131,11 @@ export class Aim {
     this.clicked = { id: this.act(target) ? id : null, at: time };
   }
 
-  /** Does what is offered, or says why nothing is; whether it did. */
+  /**
+   * Does what is offered, or says why nothing is; whether it did.
+   *
+   * @param {Target | null} target
+   */
   act(target) {
     const { act, why } = this.offers(target);
     if (act) act();
@@ -102,7 +144,11 @@ export class Aim {
     return Boolean(act);
   }
 
-  /** Keys of the map itself, while the arrows do not drive. */
+  /**
+   * Keys of the map itself, while the arrows do not drive.
+   *
+   * @param {KeyboardEvent} event
+   */
   key(event) {
     if (event.defaultPrevented || event.ctrlKey || event.altKey || event.metaKey) return;
     const { map } = this;
@@ -126,12 +172,14 @@ export class Aim {
     return this.chosen;
   }
 
+  /** @param {Point} arrow */
   step(arrow) {
     const before = this.current();
     if (!before) return;
-    this.chosen = nextTo(before.at, arrow, this.map.scene) ?? before;
+    const next = nextTo(before.at, arrow, this.map.scene) ?? before;
+    this.chosen = next;
     this.pointed = null;
-    this.map.reveal(this.chosen.at);
+    this.map.reveal(next.at);
     this.draw();
   }
 
@@ -145,27 +193,37 @@ export class Aim {
     const { svg } = this.map;
     const hasKeys = svg.matches(":focus-visible");
     const target = this.pointed ?? (hasKeys ? this.current() : null);
-    this.map.drawCross(hasKeys ? this.current()?.at : null);
+    this.map.drawCross((hasKeys && this.current()?.at) || null);
     const { what, does, why } = target ? this.offers(target) : {};
     this.tip.hidden = !what;
-    if (!what) return;
     const [name, act] = this.tip.children;
+    if (!target || !what || !name || !act) return;
     put(name, what);
     put(act, does ? say(this.pointed ? "tip_click" : "tip_enter", does) : why ?? "");
     this.place(this.map.pixels(target.at), this.map.robotPixels());
   }
 
-  /** Above what it is about, or where it covers no robot. */
+  /**
+   * Above what it is about, or where it covers no robot.
+   *
+   * @param {Point} at
+   * @param {Box | null} robot
+   */
   place([x, y], robot) {
     const { offsetWidth: wide, offsetHeight: high } = this.tip;
-    const { clientWidth: width, clientHeight: height } = this.map.svg.parentElement;
+    const { width, height } = this.map.size;
+    /** @type {(left: number, top: number) => Point} */
     const fit = (left, top) => [Math.max(4, Math.min(width - wide - 4, left)), Math.max(4, Math.min(height - high - 4, top))];
-    const places = [fit(x - wide / 2, y - OFF_PX - high), fit(x - wide / 2, y + OFF_PX), fit(x + OFF_PX, y - high / 2), fit(x - OFF_PX - wide, y - high / 2), [4, 4]];
+    const first = fit(x - wide / 2, y - OFF_PX - high);
+    /** @type {Point[]} */
+    const places = [first, fit(x - wide / 2, y + OFF_PX), fit(x + OFF_PX, y - high / 2), fit(x - OFF_PX - wide, y - high / 2), [4, 4]];
+    /** @param {Point} place */
     const isFree = ([left, top]) => {
+      /** @type {Box} */
       const box = [left, top, left + wide, top + high];
       return !meets(box, [x - 8, y - 8, x + 8, y + 8]) && !(robot && meets(box, robot));
     };
-    const [left, top] = places.find(isFree) ?? places[0];
+    const [left, top] = places.find(isFree) ?? first;
     Object.assign(this.tip.style, { left: `${Math.round(left)}px`, top: `${Math.round(top)}px` });
   }
 }

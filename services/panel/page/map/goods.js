@@ -1,5 +1,8 @@
 // The goods on the map: parcels with their numbers, at the side of the square from which they are reached.
 
+/** @import { Product, Robot, Warehouse } from "../station/robot.js" */
+/** @import { Box } from "./labels.js" */
+
 import { INSIDE } from "./floor.js";
 import { SIDES } from "./grid.js";
 import { meets } from "./labels.js";
@@ -23,28 +26,68 @@ const BESIDE = 104;
 /** A robot that puts its goods down or comes back has them no more. */
 const HANDS_EMPTY = ["backing_off", "turning_round", "returning"];
 
-/** The number of the goods that a robot has in its claw, or null. */
+/**
+ * A parcel on the map: where it is and how large, in mm, and what it is drawn with.
+ *
+ * @typedef {object} Parcel
+ * @property {string} id
+ * @property {string} [name]
+ * @property {number} x
+ * @property {number} y
+ * @property {number} size
+ * @property {number} dx
+ * @property {number} dy
+ * @property {[number, number]} square
+ * @property {boolean} isShared whether others are in the same square
+ * @property {SVGElement} box
+ * @property {SVGElement} turn
+ * @property {SVGElement} turnNumber
+ * @property {SVGElement} why
+ */
+
+/**
+ * The number of the goods that a robot has in its claw, or null.
+ *
+ * @param {Pick<Robot, "state" | "gone"> | null} robot
+ */
 export function carries(robot) {
-  const { product, phase } = robot?.state ?? {};
-  return product !== undefined && robot.gone.has(product) && !HANDS_EMPTY.includes(phase) ? product : null;
+  const { product, phase = "" } = robot?.state ?? {};
+  return product !== undefined && robot?.gone.has(product) && !HANDS_EMPTY.includes(phase) ? product : null;
 }
 
-/** Which order of a robot goods have: 0 is under way, 1 the next one; -1 if they are not ordered. */
+/**
+ * Which order of a robot goods have: 0 is under way, 1 the next one; -1 if they are not ordered.
+ *
+ * @param {Pick<Robot, "state" | "queue">} robot
+ * @param {string} product
+ */
 export function turnOf({ state: { product: current, order: number }, queue }, product) {
   const waiting = queue.filter(({ order }) => order !== number);
   return product === current ? 0 : waiting.findIndex((one) => one.product === product) + 1 || -1;
 }
 
 export class Goods {
+  /** @param {SVGElement} svg */
   constructor(svg) {
     this.group = make("g", {}, svg);
     this.names = make("g", {}, svg);
+    /** @type {Parcel[]} */
     this.parcels = [];
-    /** The boxes of the names. */
+    /**
+     * The boxes of the names.
+     *
+     * @type {Box[]}
+     */
     this.taken = [];
   }
 
-  /** All goods of a warehouse at a scale of `px` mm a pixel. */
+  /**
+   * All goods of a warehouse at a scale of `px` mm a pixel.
+   *
+   * @param {Warehouse | null} warehouse
+   * @param {number} side
+   * @param {number} px
+   */
   draw(warehouse, side, px) {
     this.group.replaceChildren();
     this.names.replaceChildren();
@@ -57,8 +100,16 @@ export class Goods {
     if (this.hasWords) for (const parcel of this.parcels) this.name(parcel, side, px);
   }
 
+  /**
+   * @param {Product} product
+   * @param {Product[]} products
+   * @param {number} side
+   * @param {number} size
+   * @param {number} px
+   * @returns {Parcel}
+   */
   parcel({ id, name, square, side: from }, products, side, size, px) {
-    const [dx, dy] = SIDES[from] ?? [0, 0];
+    const [dx, dy] = SIDES[from];
     const isShared = products.filter((other) => String(other.square) === String(square)).length > 1;
     const middle = side / 2;
     if (isShared) size = shared(size, side, px);
@@ -74,12 +125,18 @@ export class Goods {
     make("text", { class: "number", y: letter * 0.36, "font-size": letter }, box, size / px < NUMBER_PX ? "" : String(id));
     const turn = make("g", { class: "turn", transform: `translate(${size / 2} ${-size / 2})` }, box);
     make("circle", {}, turn);
-    make("text", { y: 4 * px }, turn);
-    make("text", { class: "why", y: size / 2 + 14 * px }, box);
-    return { id: String(id), name, x, y, size, dx, dy, square, isShared, box, turn };
+    const turnNumber = make("text", { y: 4 * px }, turn);
+    const why = make("text", { class: "why", y: size / 2 + 14 * px }, box);
+    return { id: String(id), name, x, y, size, dx, dy, square, isShared, box, turn, turnNumber, why };
   }
 
-  /** A name stands at its goods where it has room there. */
+  /**
+   * A name stands at its goods where it has room there.
+   *
+   * @param {Parcel} parcel
+   * @param {number} side
+   * @param {number} px
+   */
   name({ id, name, x, y, size, dx, dy, square, isShared }, side, px) {
     if (!name) return;
     const [middle, below] = [dx && !isShared ? (square[0] + 0.5) * side : x, dy >= 0];
@@ -89,44 +146,66 @@ export class Goods {
     const [across, down] = [at.x - (square[0] + 0.5) * side, at.y + (square[1] + 0.5) * side];
     const isIn = Math.abs(across) + half < side / 2 - INSIDE && Math.abs(down) + 6 * px < side / 2;
     const hits = this.parcels.some((other) => other.id !== id && Math.abs(other.x - at.x) < half + other.size / 2 && Math.abs(-other.y - at.y + 4 * px) < 8 * px + other.size / 2);
+    /** @type {Box} */
     const box = [at.x - half, at.y - 12 * px, at.x + half, at.y + 4 * px];
     if (!isIn || hits || this.taken.some((other) => meets(other, box))) text.remove();
     else this.taken.push(box);
   }
 
-  /** How each parcel stands with a robot: ordered, under way, out of reach, or no more in its place. */
+  /**
+   * How each parcel stands with a robot: ordered, under way, out of reach, or no more in its place.
+   *
+   * @param {Robot} robot
+   */
   mark(robot) {
-    const noWay = ["no_way", "unreachable"].includes(robot.state.failure);
-    for (const { id, box, turn } of this.parcels) {
+    const noWay = ["no_way", "unreachable"].includes(robot.state.failure ?? "");
+    for (const { id, box, turn, turnNumber, why } of this.parcels) {
       const order = turnOf(robot, id);
       const [isWanted, isQueued, isGone] = [order === 0, order > 0, robot.gone.has(id)];
       const isOutOfReach = isWanted ? noWay : isQueued && robot.unreachable.has(id);
       const words = ["good", isWanted && "wanted", isQueued && "queued", isGone && "gone", isOutOfReach && "out-of-reach"];
       set(box, "class", words.filter(Boolean).join(" "));
       turn.toggleAttribute("hidden", !isQueued || !this.hasNumbers);
-      put(turn.lastElementChild, isQueued ? String(order) : "");
+      put(turnNumber, isQueued ? String(order) : "");
       // In a dense map the dashed parcel says enough.
       const isAway = isGone && !isWanted && this.hasWords;
       const said = isOutOfReach ? say("no_way") : isAway ? say(wasDelivered(robot, id) ? "delivered" : "away") : "";
-      put(box.lastElementChild, said);
+      put(why, said);
       // It stands in the name's place.
       this.names.querySelector(`[data-name="${id}"]`)?.toggleAttribute("hidden", said !== "");
     }
   }
 
-  /** The boxes of parcels and names as left, top, right and bottom in mm of the drawing. */
+  /**
+   * The boxes of parcels and names in mm of the drawing.
+   *
+   * @returns {Box[]}
+   */
   get boxes() {
-    return [...this.parcels.map(({ x, y, size }) => [x - size / 2, -y - size / 2, x + size / 2, -y + size / 2]), ...this.taken];
+    /** @type {(parcel: Parcel) => Box} */
+    const box = ({ x, y, size }) => [x - size / 2, -y - size / 2, x + size / 2, -y + size / 2];
+    return [...this.parcels.map(box), ...this.taken];
   }
 }
 
-/** How large parcels are that share a square, so that they do not touch: to scale, if that can be read. */
+/**
+ * How large parcels are that share a square, so that they do not touch: to scale, if that can be read.
+ *
+ * @param {number} size
+ * @param {number} side
+ * @param {number} px
+ */
 function shared(size, side, px) {
   const room = (side / 2 - BESIDE) / 1.5;
   return Math.min(size, room >= SIZE_PX * px ? room : side / 3);
 }
 
-/** The robot's last delivery of goods that are not in their place, if it has told one. */
+/**
+ * The robot's last delivery of goods that are not in their place, if it has told one.
+ *
+ * @param {Pick<Robot, "history">} robot
+ * @param {string} product
+ */
 export function wasDelivered(robot, product) {
   return robot.history.find((one) => one.product === product) ?? null;
 }

@@ -1,6 +1,31 @@
 // The grid of a warehouse: its sides, and the things on it that a pointer or a key can mean.
 
-/** The steps to the four sides of a square, with y upwards. */
+/** @import { Side, Warehouse } from "../station/robot.js" */
+/** @import { Parcel } from "./goods.js" */
+
+/** @typedef {[number, number]} Point */
+/** @typedef {{ kind: "square", id: string, at: Point, square: Point, side: Side }} SquareSide */
+/**
+ * What a pointer or a key means; `at` is in mm.
+ *
+ * @typedef {{ kind: "good" | "crossing" | "way", id: string, at: Point } | SquareSide} Target
+ */
+/**
+ * What there is to mean.
+ *
+ * @typedef {object} Scene
+ * @property {Warehouse | null} warehouse
+ * @property {number} side of a square, in mm
+ * @property {number} scale mm of one pixel
+ * @property {Pick<Parcel, "id" | "x" | "y" | "size">[]} parcels
+ * @property {boolean} isPlacing whether goods are being placed
+ */
+
+/**
+ * The steps to the four sides of a square, with y upwards.
+ *
+ * @type {Record<Side, Point>}
+ */
 export const SIDES = { left: [-1, 0], up: [0, 1], right: [1, 0], down: [0, -1] };
 
 /** How near a point means a crossing or a way: as a part of a square's side, and in pixels at least. */
@@ -8,42 +33,94 @@ const NEAR = 0.15;
 const NEAR_PX = 8;
 /** How far from its middle the side of a square is meant by keys, as a part of the square's side. */
 const ASIDE = 0.3;
+/** @type {Side[]} */
+const ALL_SIDES = ["left", "up", "right", "down"];
 
-/** Column, row and side of a way from its words, `x y side`, and its middle in mm. */
+/**
+ * Column, row and side of a way from its words, `x y side`, and its middle in mm.
+ *
+ * @param {string} words
+ * @param {number} side of a square, in mm
+ * @returns {{ x: number, y: number, to: Side | undefined, dx: number, dy: number, middle: Point }}
+ */
 export function way(words, side) {
-  const [x, y, to] = words.split(" ");
-  const [dx, dy] = SIDES[to] ?? [0, 0];
+  const [x, y, name] = words.split(" ");
+  const to = ALL_SIDES.find((one) => one === name);
+  const [dx, dy] = to ? SIDES[to] : [0, 0];
   return { x: Number(x), y: Number(y), to, dx, dy, middle: [(Number(x) + dx / 2) * side, (Number(y) + dy / 2) * side] };
 }
 
-/** The two crossings of a way as `x,y`, from its words. */
+/**
+ * The two crossings of a way as `x,y`, from its words.
+ *
+ * @param {string} words
+ */
 export function ends(words) {
   const { x, y, dx, dy } = way(words, 1);
   return [`${x},${y}`, `${x + dx},${y + dy}`];
 }
 
-/** The words of the same way from its end that is further left or lower. */
+/**
+ * The words of the same way from its end that is further left or lower.
+ *
+ * @param {string} words
+ * @returns {string}
+ */
 export function oneName(words) {
   const { x, y, to, dx, dy } = way(words, 1);
-  return { left: `${x + dx} ${y} right`, down: `${x} ${y + dy} up` }[to] ?? words;
+  if (to === "left") return `${x + dx} ${y} right`;
+  return to === "down" ? `${x} ${y + dy} up` : words;
 }
 
-/** The side of its square that a point is nearest to. */
+/**
+ * The side of its square that a point is nearest to.
+ *
+ * @param {number} x
+ * @param {number} y
+ */
 function nearestSide(x, y) {
   const ways = { left: x, right: 1 - x, down: y, up: 1 - y };
-  return Object.keys(ways).reduce((best, side) => (ways[side] < ways[best] ? side : best));
+  return ALL_SIDES.reduce((best, side) => (ways[side] < ways[best] ? side : best));
 }
 
+/**
+ * @param {number} x
+ * @param {number} y
+ * @param {number} side
+ * @returns {Target}
+ */
 const crossing = (x, y, side) => ({ kind: "crossing", id: `${x},${y}`, at: [x * side, y * side] });
+/**
+ * @param {string} words
+ * @param {number} side
+ * @returns {Target}
+ */
 const wayAt = (words, side) => ({ kind: "way", id: words, at: way(words, side).middle });
+/**
+ * @param {Pick<Parcel, "id" | "x" | "y">} parcel
+ * @returns {Target}
+ */
 const good = ({ id, x, y }) => ({ kind: "good", id, at: [x, y] });
 
+/**
+ * @param {number} x
+ * @param {number} y
+ * @param {Side} from
+ * @param {number} side
+ * @returns {Target}
+ */
 function square(x, y, from, side) {
   const [dx, dy] = SIDES[from];
   return { kind: "square", id: `${x} ${y} ${from}`, square: [x, y], side: from, at: [(x + 0.5 + dx * ASIDE) * side, (y + 0.5 + dy * ASIDE) * side] };
 }
 
-/** What a point in mm means: goods, a crossing or a way; while goods are placed, the side of a square; or null. */
+/**
+ * What a point in mm means: goods, a crossing or a way; while goods are placed, the side of a square; or null.
+ *
+ * @param {Point} point
+ * @param {Scene} scene
+ * @returns {Target | null}
+ */
 export function meant([px, py], { warehouse, side, scale, parcels, isPlacing }) {
   if (!warehouse) return null;
   const [width, height] = warehouse.size;
@@ -64,13 +141,19 @@ export function meant([px, py], { warehouse, side, scale, parcels, isPlacing }) 
   return null;
 }
 
-/** Everything that keys can reach. */
-function all({ warehouse: { size: [width, height] }, side, parcels, isPlacing }) {
+/**
+ * Everything that keys can reach.
+ *
+ * @param {Scene} scene
+ */
+function all({ warehouse, side, parcels, isPlacing }) {
+  if (!warehouse) return [];
+  const [width, height] = warehouse.size;
   const found = isPlacing ? [] : parcels.map(good);
   for (let x = 0; x <= width; x++) {
     for (let y = 0; y <= height; y++) {
       if (isPlacing) {
-        if (x < width && y < height) for (const from of Object.keys(SIDES)) found.push(square(x, y, from, side));
+        if (x < width && y < height) for (const from of ALL_SIDES) found.push(square(x, y, from, side));
         continue;
       }
       found.push(crossing(x, y, side));
@@ -81,19 +164,38 @@ function all({ warehouse: { size: [width, height] }, side, parcels, isPlacing })
   return found;
 }
 
-/** The thing that is next from a point in mm in a direction; what lies aside counts as further. Null if there is none. */
+/**
+ * The thing that is next from a point in mm in a direction; what lies aside counts as further. Null if there is none.
+ *
+ * @param {Point} point
+ * @param {Point} direction
+ * @param {Scene} scene
+ * @returns {Target | null}
+ */
 export function nextTo([px, py], [dx, dy], scene) {
-  let best = { target: null, far: Infinity };
+  /** @type {Target | null} */
+  let best = null;
+  let least = Infinity;
   for (const target of all(scene)) {
     const [x, y] = [target.at[0] - px, target.at[1] - py];
     const [along, across] = [x * dx + y * dy, Math.abs(x * dy - y * dx)];
-    if (along > 1 && across <= along && along + 2 * across < best.far) best = { target, far: along + 2 * across };
+    if (along <= 1 || across > along || along + 2 * across >= least) continue;
+    least = along + 2 * across;
+    best = target;
   }
-  return best.target;
+  return best;
 }
 
-/** The thing that is nearest to a point in mm. */
+/**
+ * The thing that is nearest to a point in mm; null if there is none.
+ *
+ * @param {Point} point
+ * @param {Scene} scene
+ * @returns {Target | null}
+ */
 export function nearest([px, py], scene) {
+  /** @param {Target} one */
   const far = ({ at: [x, y] }) => Math.hypot(x - px, y - py);
-  return all(scene).reduce((best, one) => (far(one) < far(best) ? one : best));
+  const [first = null, ...others] = all(scene);
+  return others.reduce((best, one) => (best && far(best) <= far(one) ? best : one), first);
 }

@@ -2,6 +2,12 @@
 // floor is to scale; letters, hairlines and labels keep their size on the screen. For them the drawing has its scale
 // in `--px`, the mm of one pixel.
 
+/** @import { Robot as Model, Pose, Warehouse } from "../station/robot.js" */
+/** @import { Face } from "../bar/face.js" */
+/** @import { Point, Scene, Target } from "./grid.js" */
+/** @import { Box, Said } from "./labels.js" */
+/** @import { Offer } from "./offers.js" */
+
 import { Aim } from "./aim.js";
 import { Floor } from "./floor.js";
 import { Goods, carries } from "./goods.js";
@@ -32,12 +38,40 @@ const REDUCED = matchMedia("(prefers-reduced-motion: reduce)");
 const FAR = matchMedia("(min-width: 2400px)");
 
 export class WarehouseMap {
-  /** `hand` is what `Aim` takes and `isPlacing`, whether a click places goods; `tell` says something below the map. */
+  /**
+   * @param {SVGSVGElement} svg
+   * @param {object} parts
+   * @param {HTMLElement} parts.words
+   * @param {HTMLElement} parts.scaleBar
+   * @param {HTMLDetailsElement} parts.legend
+   * @param {Record<"zoomIn" | "zoomOut" | "fit" | "follow", HTMLElement>} parts.tools
+   * @param {{ tip: HTMLElement, offers: (target: Target | null) => Offer, isArmed: () => boolean, isPlacing: () => boolean }} parts.hand
+   *   is what `Aim` takes and `isPlacing`, whether a click places goods
+   * @param {(words: string) => void} parts.tell says something below the map
+   */
   constructor(svg, { words, scaleBar, legend, tools, hand, tell }) {
-    Object.assign(this, { svg, words, scaleBar, legend, tell, isPlacing: hand.isPlacing, followButton: tools.follow });
+    this.svg = svg;
+    this.words = words;
+    this.scaleBar = scaleBar;
+    this.legend = legend;
+    this.tell = tell;
+    this.isPlacing = hand.isPlacing;
+    this.followButton = tools.follow;
+    /** @type {Warehouse | null} */
     this.warehouse = null;
+    /**
+     * Left, top, width and height of what is seen at least, in mm of the drawing.
+     *
+     * @type {[number, number, number, number]}
+     */
     this.view = [0, 0, 1000, 1000];
     this.px = 1;
+    /**
+     * The scale at which letters and goods are drawn.
+     *
+     * @type {number | null}
+     */
+    this.scaled = null;
     this.following = false;
     this.floor = new Floor(svg);
     this.goods = new Goods(svg);
@@ -48,8 +82,15 @@ export class WarehouseMap {
     this.body = new Robot(svg, "robot");
     this.ghost = new Robot(svg, "ghost");
     this.cross = make("circle", { class: "cross" }, svg);
+    /** @type {Map<string, { group: SVGElement, robot: Robot }>} */
     this.robots = new Map();
+    /** @type {Face | null} */
     this.state = null;
+    /**
+     * Where the robot is drawn, since when.
+     *
+     * @type {(Pose & { at: number }) | null}
+     */
     this.shown = null;
     this.aim = new Aim(this, hand);
     tools.zoomIn.onclick = () => this.zoom(0.8);
@@ -66,7 +107,11 @@ export class WarehouseMap {
     }).observe(svg);
   }
 
-  /** Draws another warehouse, or the same with other goods. */
+  /**
+   * Draws another warehouse, or the same with other goods.
+   *
+   * @param {Warehouse | null} warehouse
+   */
   setWarehouse(warehouse) {
     const before = this.warehouse;
     this.warehouse = warehouse;
@@ -79,22 +124,35 @@ export class WarehouseMap {
     else this.fit();
   }
 
-  /** Keeps the robot in the middle of the view, until a person moves the view. */
+  /**
+   * Keeps the robot in the middle of the view, until a person moves the view.
+   *
+   * @param {boolean} isOn
+   */
   follow(isOn) {
     this.following = isOn;
-    this.followButton.setAttribute("aria-pressed", isOn);
+    this.followButton.setAttribute("aria-pressed", String(isOn));
   }
 
   get side() {
     return this.floor.side;
   }
 
-  /** What the hand may mean. */
+  /**
+   * What the hand may mean.
+   *
+   * @returns {Scene}
+   */
   get scene() {
     return { warehouse: this.warehouse, side: this.side, scale: this.px, parcels: this.goods.parcels, isPlacing: this.isPlacing() };
   }
 
-  /** Moves a robot to where it is now, or where it was last; called before each picture. */
+  /**
+   * Moves a robot to where it is now, or where it was last; called before each picture.
+   *
+   * @param {Model | null} robot
+   * @param {number} now
+   */
   move(robot, now) {
     const isKnown = robot?.state.x_mm !== undefined;
     const shown = isKnown || Boolean(robot?.pose);
@@ -107,7 +165,7 @@ export class WarehouseMap {
     this.svg.classList.toggle("lost", shown && !isKnown);
     this.svg.classList.toggle("stopped", robot?.state.stopped === "1");
     if (robot?.truth) this.ghost.move(robot.truth);
-    if (!shown) return;
+    if (!robot?.pose) return;
     const { unsure } = robot.pose;
     const pose = this.glide(this.floor.onWayOut(robot.pose), now, stale);
     this.body.move(pose);
@@ -120,7 +178,14 @@ export class WarehouseMap {
     if (this.following) this.centre(pose.x, -pose.y);
   }
 
-  /** Draws what changes now and then: ways, goods, the robots' states and what is said of them. */
+  /**
+   * Draws what changes now and then: ways, goods, the robots' states and what is said of them.
+   *
+   * @param {Model | null} robot
+   * @param {Model[]} others
+   * @param {number} now
+   * @param {Face} state
+   */
   draw(robot, others, now, state) {
     this.state = state;
     put(this.words, this.describe(robot));
@@ -140,14 +205,20 @@ export class WarehouseMap {
     this.aim.draw();
   }
 
-  /** The other robots of the station. */
+  /**
+   * The other robots of the station.
+   *
+   * @param {Model[]} robots
+   * @param {number} now
+   */
   drawOthers(robots, now) {
     const names = new Set(robots.map(({ name }) => name));
     for (const [name, { group, robot }] of this.robots) {
       group.toggleAttribute("hidden", !names.has(name));
       if (!names.has(name)) robot.show(false);
     }
-    for (const one of robots.filter(({ pose }) => pose)) {
+    for (const one of robots) {
+      if (!one.pose) continue;
       let other = this.robots.get(one.name);
       if (!other) {
         const group = make("g", { class: "other", "data-robot": one.name }, this.others);
@@ -163,7 +234,12 @@ export class WarehouseMap {
     }
   }
 
-  /** What is said at robots, crossings and ways: the gravest first. */
+  /**
+   * What is said at robots, crossings and ways: the gravest first.
+   *
+   * @param {Model | null} robot
+   * @param {Model[]} others
+   */
   drawLabels(robot, others) {
     const { px, side } = this;
     const { look, chip } = this.state ?? {};
@@ -171,21 +247,26 @@ export class WarehouseMap {
     const words = [chip, look !== "lost" && robot?.state.phase && !isKnown && say("place_unknown")].filter(Boolean).join(", ");
     const [left, top, right, bottom] = this.seen;
     // Below stand the map's own words and buttons.
+    /** @type {Box} */
     const view = [left, top, right, bottom - BELOW_PX * px];
+    /** @type {Said[]} */
     const labels = [];
+    /** @type {(box: Box | null, key: string, style: string, words: string) => void} */
     const about = (box, key, style, words) => {
       const [left, top, right, bottom] = box ?? [view[0], view[1], view[2], view[1]];
       labels.push({ key, style, words, at: [(left + right) / 2, (top + bottom) / 2], reach: [(right - left) / 2, (bottom - top) / 2] });
     };
     if (words) about(this.body.box, "chip", "chip", words);
     const next = robot && nextOf(robot, side);
+    /** @type {Point} */
     const ring = [10 * px, 10 * px];
-    if (next) labels.push({ key: "next", style: "label flag", words: say("flag_next", robot.state.next), at: [next[0], -next[1]], reach: ring });
+    if (next) labels.push({ key: "next", style: "label flag", words: say("flag_next", robot?.state.next), at: [next[0], -next[1]], reach: ring });
     for (const blocked of robot?.blocked.keys() ?? []) {
+      if (!robot) break;
       const [x, y] = way(blocked, side).middle;
       labels.push({ key: `blocked ${blocked}`, style: "label shut", words: say("flag_blocked", blockedFor(robot, blocked)), at: [x, -y], reach: ring });
     }
-    for (const { name } of others.filter(({ pose }) => pose)) about(this.robots.get(name).robot.box, `of ${name}`, "label name-of", name);
+    for (const { name } of others.filter(({ pose }) => pose)) about(this.robots.get(name)?.robot.box ?? null, `of ${name}`, "label name-of", name);
     // One that moves with its robot is laid about the point that moves.
     const own = labels.find(({ key }) => key === "chip");
     if (own && this.body.pose) {
@@ -196,10 +277,14 @@ export class WarehouseMap {
     this.labels.lay(labels, { hard: this.boxes, soft: this.goods.boxes, view, px });
   }
 
-  /** The boxes of all robots. */
+  /**
+   * The boxes of all robots.
+   *
+   * @returns {Box[]}
+   */
   get boxes() {
     const others = [...this.robots.values()].map(({ robot }) => robot.box);
-    return [this.body.box, ...others].filter(Boolean);
+    return [this.body.box, ...others].flatMap((box) => (box ? [box] : []));
   }
 
   /** The open legend stands where it covers no robot. */
@@ -207,18 +292,24 @@ export class WarehouseMap {
     if (!this.legend.open) return;
     const robot = this.robotPixels();
     if (!robot) return;
-    const zone = this.svg.parentElement.getBoundingClientRect();
+    const zone = this.svg.getBoundingClientRect();
     const { left, top, right, bottom } = this.legend.getBoundingClientRect();
     if (meets([left - zone.left, top - zone.top, right - zone.left, bottom - zone.top], robot)) this.legend.classList.toggle("aside");
   }
 
-  /** The picture for somebody who does not see it. */
+  /**
+   * The picture for somebody who does not see it.
+   *
+   * @param {Model | null} robot
+   */
   describe(robot) {
     if (!this.warehouse) return say("no_map");
     const [width, height] = this.warehouse.size;
+    /** @param {number} id */
     const gone = (id) => (robot?.gone.has(String(id)) ? ` (${say("away")})` : "");
     const goods = (this.warehouse.product ?? []).map(({ id, square, side }) => `${id} (${square.join(", ")}) ${say(side)}${gone(id)}`);
     const { node, looks, next } = robot?.state ?? {};
+    /** @param {string[]} all */
     const ways = (all) => all.map((words) => ends(words).map(crossing).join("\u2013")).join("; ");
     return [
       say("text_size", width, height, goods.join("; ") || "\u2013"),
@@ -229,21 +320,32 @@ export class WarehouseMap {
     ].filter(Boolean).join(" ");
   }
 
-  /** Where to draw between two poses. */
+  /**
+   * Where to draw between two poses.
+   *
+   * @param {Pose} aim
+   * @param {number} now
+   * @param {boolean} stale
+   * @returns {Pose}
+   */
   glide(aim, now, stale) {
     const still = REDUCED.matches;
     const shown = this.shown;
-    const jump = !shown || still || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500;
-    const part = jump ? 1 : Math.min(1, (now - shown.at) / GLIDE_MS);
+    if (!shown || still || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500) {
+      this.shown = { ...aim, at: now };
+      return stale && shown ? shown : aim;
+    }
+    if (stale) return shown;
+    const part = Math.min(1, (now - shown.at) / GLIDE_MS);
     // From -180 to 180, however often it has turned round.
-    const turn = jump ? 0 : ((((aim.heading - shown.heading + 180) % 360) + 360) % 360) - 180;
+    const turn = ((((aim.heading - shown.heading + 180) % 360) + 360) % 360) - 180;
     const pose = {
-      x: jump ? aim.x : shown.x + (aim.x - shown.x) * part,
-      y: jump ? aim.y : shown.y + (aim.y - shown.y) * part,
-      heading: jump ? aim.heading : shown.heading + turn * part,
+      x: shown.x + (aim.x - shown.x) * part,
+      y: shown.y + (aim.y - shown.y) * part,
+      heading: shown.heading + turn * part,
     };
-    if (!stale || jump) this.shown = { ...pose, at: now };
-    return stale && shown ? shown : pose;
+    this.shown = { ...pose, at: now };
+    return pose;
   }
 
   /** All of the floor, above the map's words and buttons. */
@@ -260,6 +362,10 @@ export class WarehouseMap {
     this.show();
   }
 
+  /**
+   * @param {number} by
+   * @param {Point} about
+   */
   zoom(by, [cx, cy] = [this.view[0] + this.view[2] / 2, this.view[1] + this.view[3] / 2]) {
     const [x, y, width, height] = this.view;
     if (width * by < NEAREST_MM || width * by > FARTHEST_MM) return;
@@ -268,7 +374,12 @@ export class WarehouseMap {
     this.show();
   }
 
-  /** Moves the view by hand, in mm of the drawing. */
+  /**
+   * Moves the view by hand, in mm of the drawing.
+   *
+   * @param {number} x
+   * @param {number} y
+   */
   shift(x, y) {
     this.follow(false);
     this.isFitted = false;
@@ -277,13 +388,21 @@ export class WarehouseMap {
     this.show();
   }
 
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
   centre(x, y) {
     this.isFitted = false;
     this.view = [x - this.view[2] / 2, y - this.view[3] / 2, this.view[2], this.view[3]];
     this.show();
   }
 
-  /** Brings a point of the floor into the view. */
+  /**
+   * Brings a point of the floor into the view.
+   *
+   * @param {Point} point
+   */
   reveal([x, y]) {
     const [left, top, right, bottom] = this.seen;
     if (x < left || x > right || -y < top || -y > bottom) {
@@ -301,16 +420,21 @@ export class WarehouseMap {
     if (this.scaled === px) return;
     this.scaled = px;
     this.px = px;
-    this.svg.style.setProperty("--px", px);
+    this.svg.style.setProperty("--px", String(px));
     this.floor.scale(px);
     this.goods.draw(this.warehouse, this.side, px);
   }
 
-  /** A bar of one metre, or of what fits in a quarter of the map. */
+  /**
+   * A bar of one metre, or of what fits in a quarter of the map.
+   *
+   * @param {number} pixel mm of one pixel
+   */
   drawScale(pixel) {
     const room = this.size.width / 4;
-    const metres = BARS.findLast((metres) => (metres * 1_000) / pixel <= room) ?? BARS[0];
+    const metres = BARS.findLast((metres) => (metres * 1_000) / pixel <= room) ?? 0.1;
     const [bar, length] = this.scaleBar.children;
+    if (!(bar instanceof HTMLElement) || !length) return;
     bar.style.width = `${Math.round((metres * 1_000) / pixel / (FAR.matches ? 1.5 : 1))}px`;
     put(length, `${metres < 1 ? decimal(metres) : metres} m`);
   }
@@ -320,14 +444,23 @@ export class WarehouseMap {
     return Math.max(this.view[2] / (this.size.width || 1), this.view[3] / (this.size.height || 1));
   }
 
-  /** What is seen of the drawing: left, top, right and bottom in mm. */
+  /**
+   * What is seen of the drawing, in mm.
+   *
+   * @returns {Box}
+   */
   get seen() {
     const { pixel, size, view: [x, y, width, height] } = this;
     const [dx, dy] = [(size.width * pixel - width) / 2, (size.height * pixel - height) / 2];
     return [x - dx, y - dy, x + width + dx, y + height + dy];
   }
 
-  /** A point of the screen in mm of the drawing. */
+  /**
+   * A point of the screen in mm of the drawing.
+   *
+   * @param {{ clientX: number, clientY: number }} event
+   * @returns {Point}
+   */
   point(event) {
     const matrix = this.svg.getScreenCTM()?.inverse();
     if (!matrix) return [0, 0];
@@ -335,20 +468,33 @@ export class WarehouseMap {
     return [x, y];
   }
 
-  /** A point of the floor in pixels of the map. */
+  /**
+   * A point of the floor in pixels of the map.
+   *
+   * @param {Point} point
+   * @returns {Point}
+   */
   pixels([x, y]) {
     const [left, top] = this.seen;
     return [(x - left) / this.pixel, (-y - top) / this.pixel];
   }
 
-  /** The robot's box in pixels of the map; null if it is not shown. */
+  /**
+   * The robot's box in pixels of the map; null if it is not shown.
+   *
+   * @returns {Box | null}
+   */
   robotPixels() {
     const { box } = this.body;
     if (!box) return null;
     return [...this.pixels([box[0], -box[1]]), ...this.pixels([box[2], -box[3]])];
   }
 
-  /** A ring about what the keys mean. */
+  /**
+   * A ring about what the keys mean.
+   *
+   * @param {Point | null} at
+   */
   drawCross(at) {
     this.cross.toggleAttribute("hidden", !at);
     if (at) set(this.cross, "transform", `translate(${at[0]} ${-at[1]})`);

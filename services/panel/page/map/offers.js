@@ -1,5 +1,9 @@
 // What the things on the map are, and what a click on one does now: the one place for tip and click.
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot, Side } from "../station/robot.js" */
+/** @import { Point, SquareSide, Target } from "./grid.js" */
+
 import { carries, turnOf, wasDelivered } from "./goods.js";
 import { ends, oneName } from "./grid.js";
 import { crossing } from "../words/sentences.js";
@@ -7,62 +11,102 @@ import { blockedFor } from "./ways.js";
 import { clock, say } from "../words/words.js";
 
 /**
- * `link` and `robot` as everywhere. `fetch` orders goods or asks whether they are back, `stands` says where the robot
- * stands, `obstacle` puts or takes one, `goods` puts goods at the side of a square; `isPlaceWanted` and `now` as named.
+ * What a thing is, what a click on it does, and why a click does nothing; `act` is the click.
+ *
+ * @typedef {{ what?: string, does?: string | undefined, why?: string | undefined, act?: (() => unknown) | undefined }} Offer
+ */
+
+/**
+ * @param {object} page
+ * @param {Pick<Link, "warehouse" | "mayDrive">} page.link
+ * @param {() => Robot | null} page.robot
+ * @param {(product: string) => unknown} page.fetch orders goods, or asks whether they are back
+ * @param {(crossing: string[]) => unknown} page.stands says where the robot stands
+ * @param {() => boolean} page.isPlaceWanted whether that is to be said
+ * @param {(way: string) => unknown} page.obstacle puts an obstacle there or takes it away
+ * @param {(square: Point, side: Side) => unknown} page.goods puts goods at the side of a square
+ * @param {() => number} page.now
+ * @returns {(target: Target | null) => Offer}
  */
 export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now }) {
-  const of = {
-    /** Goods are fetched; those that are not in their place, after a question. */
-    good({ id }) {
-      const { name, square } = link.warehouse.product.find((product) => String(product.id) === id);
-      const what = say("tip_good", name ? `${id} ${name}` : id, square.join(","));
-      const shown = robot();
-      if (!shown) return { what, why: say("no_robot") };
-      const turn = turnOf(shown, id);
-      if (carries(shown) === id) return { what, why: say("in_claw") };
-      if (turn === 0) return { what, why: say("is_fetched") };
-      if (turn > 0) return { what, why: say("waits_as", turn) };
-      const why = cannot(shown);
-      const act = why ? undefined : () => fetch(id);
-      if (shown.gone.has(id)) {
-        const delivery = wasDelivered(shown, id);
-        const was = delivery ? say("delivered_at", clock(delivery.at)) : say("away");
-        return { what: `${what}, ${was}`, does: why ? undefined : say("does_ask_back"), why, act };
-      }
-      const after = shown.queue.filter(({ order }) => order !== shown.state.order).length;
-      return { what, does: why ? undefined : after ? say("does_fetch_as", after + 1) : say("does_fetch"), why, act };
-    },
+  /**
+   * Goods are fetched; those that are not in their place, after a question.
+   *
+   * @param {string} id
+   * @returns {Offer}
+   */
+  function good(id) {
+    const { name, square = [] } = link.warehouse?.product?.find((product) => String(product.id) === id) ?? {};
+    const what = say("tip_good", name ? `${id} ${name}` : id, square.join(","));
+    const shown = robot();
+    if (!shown) return { what, why: say("no_robot") };
+    const turn = turnOf(shown, id);
+    if (carries(shown) === id) return { what, why: say("in_claw") };
+    if (turn === 0) return { what, why: say("is_fetched") };
+    if (turn > 0) return { what, why: say("waits_as", turn) };
+    const why = cannot(shown);
+    const act = why ? undefined : () => fetch(id);
+    if (shown.gone.has(id)) {
+      const delivery = wasDelivered(shown, id);
+      const was = delivery ? say("delivered_at", clock(delivery.at)) : say("away");
+      return { what: `${what}, ${was}`, does: why ? undefined : say("does_ask_back"), why, act };
+    }
+    const after = shown.queue.filter(({ order }) => order !== shown.state.order).length;
+    return { what, does: why ? undefined : after ? say("does_fetch_as", after + 1) : say("does_fetch"), why, act };
+  }
 
-    /** A crossing is where the robot stands, while that is to be said. */
-    crossing({ id }) {
-      const what = say("tip_crossing", crossing(id));
-      if (!isPlaceWanted()) return { what, why: say("place_how", say("where")) };
-      const why = cannot(robot());
-      return { what, does: why ? undefined : say("does_stand"), why, act: why ? undefined : () => stands(id.split(",")) };
-    },
+  /**
+   * A crossing is where the robot stands, while that is to be said.
+   *
+   * @param {string} id
+   * @returns {Offer}
+   */
+  function node(id) {
+    const what = say("tip_crossing", crossing(id));
+    if (!isPlaceWanted()) return { what, why: say("place_how", say("where")) };
+    const why = cannot(robot());
+    return { what, does: why ? undefined : say("does_stand"), why, act: why ? undefined : () => stands(id.split(",")) };
+  }
 
-    /** On a way of a simulated world an obstacle is put, or taken away. */
-    way({ id }) {
-      const shown = robot();
-      const found = shown && [...shown.blocked.keys()].find((words) => oneName(words) === id);
-      const since = found ? `, ${say("found_for", blockedFor(shown, found))}` : "";
-      const what = say("tip_way", ...ends(id).map(crossing)) + since;
-      const why = cannot(shown) ?? (shown.truth ? undefined : say("real_floor"));
-      if (why) return { what, why };
-      const isThere = shown.placed.some((words) => oneName(words) === id);
-      return { what, does: say(isThere ? "does_take" : "does_put"), act: () => obstacle(id) };
-    },
+  /**
+   * On a way of a simulated world an obstacle is put, or taken away.
+   *
+   * @param {string} id
+   * @returns {Offer}
+   */
+  function way(id) {
+    const shown = robot();
+    const found = shown && [...shown.blocked.keys()].find((words) => oneName(words) === id);
+    const since = found ? `, ${say("found_for", blockedFor(shown, found))}` : "";
+    const what = say("tip_way", ...ends(id).map(crossing)) + since;
+    const why = cannot(shown) ?? (shown?.truth ? undefined : say("real_floor"));
+    if (why) return { what, why };
+    const isThere = shown?.placed.some((words) => oneName(words) === id);
+    return { what, does: say(isThere ? "does_take" : "does_put"), act: () => obstacle(id) };
+  }
 
-    square: ({ square, side }) => ({ what: say("tip_square", square.join(","), say(side)), does: say("does_goods"), act: () => goods(square, side) }),
-  };
+  /**
+   * @param {SquareSide} target
+   * @returns {Offer}
+   */
+  function place({ square, side }) {
+    return { what: say("tip_square", square.join(","), say(side)), does: say("does_goods"), act: () => goods(square, side) };
+  }
 
-  /** Why a robot is told nothing now. */
+  /**
+   * Why a robot is told nothing now.
+   *
+   * @param {Robot | null} shown
+   */
   function cannot(shown) {
     if (!shown) return say("no_robot");
     if (!link.mayDrive) return say("viewer");
     return shown.isStale(now()) ? say("old") : undefined;
   }
 
-  /** What it is, what a click does, or why a click does nothing. */
-  return (target) => (target ? of[target.kind](target) : { why: say("nothing_here") });
+  return (target) => {
+    if (!target) return { why: say("nothing_here") };
+    if (target.kind === "square") return place(target);
+    return { good, crossing: node, way }[target.kind](target.id);
+  };
 }

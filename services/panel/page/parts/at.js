@@ -12,3 +12,15 @@ export function at(id) {
   const element = document.getElementById(id);
   return element;
 }
+
+/**
+ * All elements of a kind that a selector finds.
+ *
+ * @template {Element} Kind
+ * @param {string} selector
+ * @param {new () => Kind} kind
+ * @returns {Kind[]}
+ */
+export function every(selector, kind) {
+  return [...document.querySelectorAll(selector)].flatMap((one) => (one instanceof kind ? [one] : []));
+}

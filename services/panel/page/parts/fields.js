@@ -3,15 +3,39 @@
 
 import { say } from "../words/words.js";
 
-/** Has the page judge a form. */
+/**
+ * Has the page judge a form.
+ *
+ * @param {HTMLFormElement} form
+ */
 export function judge(form) {
   form.noValidate = true;
 }
 
-/** What is wrong with the first of these fields that cannot be; null if nothing is. What is disabled counts not. */
+/**
+ * The field of a form that has a name; `kind` is what it is: an input, a list, or several to choose one of.
+ *
+ * @template {Element | RadioNodeList} Kind
+ * @param {HTMLFormElement} form
+ * @param {string} name
+ * @param {new () => Kind} kind
+ * @returns {Kind}
+ */
+export function field(form, name, kind) {
+  const found = form.elements.namedItem(name);
+  if (found instanceof kind) return found;
+  throw new Error(`the form #${form.id} has no such field as ${name}`);
+}
+
+/**
+ * What is wrong with the first of these fields that cannot be; null if nothing is. What is disabled counts not.
+ *
+ * @param {Iterable<Element>} fields
+ * @returns {string | null}
+ */
 export function wrong(fields) {
-  const field = [...fields].find((field) => field.willValidate && !field.validity.valid);
-  if (!field) return null;
-  const name = field.getAttribute("aria-label") ?? field.closest("label")?.textContent.trim() ?? field.name;
+  const field = [...fields].find((field) => field instanceof HTMLInputElement && field.willValidate && !field.validity.valid);
+  if (!(field instanceof HTMLInputElement)) return null;
+  const name = field.getAttribute("aria-label") ?? field.closest("label")?.textContent?.trim() ?? field.name;
   return field.max ? say("field_range", name, field.min, field.max) : say("field_least", name, field.min);
 }

@@ -3,6 +3,7 @@
 
 import { TABLE } from "./table.js";
 
+/** @type {Record<string, Record<string, string>>} */
 const WORDS = {
   en: {
     add_product: "Add goods", age: "last heard {0} ago", arm: "Arm", arm_waits: "The robot drives: stop it first, then move the arm.",
@@ -117,16 +118,15 @@ const WORDS = {
   },
 };
 
-/** The page itself keeps the language in use. */
-const root = document.documentElement;
-
-/** The language in use: chosen before, or the browser's. */
+/**
+ * The language in use, which the page itself keeps: chosen before, or the browser's.
+ *
+ * @returns {"en" | "sv"}
+ */
 export function current() {
-  if (!root.dataset.language) {
-    const kept = localStorage.getItem("language");
-    use(kept in WORDS ? kept : navigator.language.startsWith("sv") ? "sv" : "en");
-  }
-  return root.dataset.language;
+  const { language } = document.documentElement.dataset;
+  if (language === "en" || language === "sv") return language;
+  return use(localStorage.getItem("language") ?? navigator.language);
 }
 
 /** Changes to the other language. */
@@ -135,28 +135,56 @@ export function change() {
   localStorage.setItem("language", current());
 }
 
-function use(language) {
+/**
+ * Uses the language of a tag such as `sv-SE`; English if the page does not know it.
+ *
+ * @param {string} tag
+ */
+function use(tag) {
+  const language = tag.startsWith("sv") ? "sv" : "en";
+  const root = document.documentElement;
   root.dataset.language = root.lang = language;
+  return language;
 }
 
-/** A word or sentence; {0} and so on are filled in. */
+/** @typedef {[string, ...(string | number | null | undefined)[]]} Words A key of this table, and its values. */
+
+/**
+ * A word or sentence; {0} and so on are filled in.
+ *
+ * @param {string} key
+ * @param {(string | number | null | undefined)[]} values
+ * @returns {string}
+ */
 export function say(key, ...values) {
-  const text = WORDS[current()][key] ?? TABLE[key]?.[current()] ?? key;
-  return text.replace(/\{(\d)\}/g, (_, index) => values[index] ?? "");
+  const text = WORDS[current()]?.[key] ?? TABLE[key]?.[current()] ?? key;
+  return text.replace(/\{(\d)\}/g, (_, index) => String(values[index] ?? ""));
 }
 
-/** A number with one decimal, as the language writes it. */
+/**
+ * A number with one decimal, as the language writes it.
+ *
+ * @param {number} value
+ */
 export function decimal(value) {
   const text = value.toFixed(1);
   return current() === "sv" ? text.replace(".", ",") : text;
 }
 
-/** The time of day of a moment in ms since 1970. */
+/**
+ * The time of day of a moment in ms since 1970.
+ *
+ * @param {number} at
+ */
 export function clock(at) {
   return new Date(at).toLocaleTimeString(current());
 }
 
-/** A time in ms, in words. */
+/**
+ * A time in ms, in words.
+ *
+ * @param {number} ms
+ */
 export function span(ms) {
   if (ms < 1_000) return `${Math.max(0, Math.round(ms))} ms`;
   if (ms < 60_000) return `${decimal(ms / 1_000)} s`;
@@ -164,20 +192,31 @@ export function span(ms) {
   return `${Math.floor(ms / 3_600_000)} h`;
 }
 
-/** Fills in the words that stand in the page itself. */
+/**
+ * Fills in the words that stand in the page itself.
+ *
+ * @param {ParentNode} part
+ */
 export function translate(part = document) {
-  for (const element of part.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
-  for (const element of part.querySelectorAll("[data-label]")) {
-    element.setAttribute("aria-label", say(element.dataset.label));
-    if (element.matches("input[type=search], #name")) element.placeholder = say(element.dataset.label);
+  /** @param {string} name */
+  const all = (name) => [...part.querySelectorAll(`[${name}]`)].map((element) => ({ element, words: say(element.getAttribute(name) ?? "") }));
+  for (const { element, words } of all("data-word")) element.textContent = words;
+  for (const { element, words } of all("data-label")) {
+    element.setAttribute("aria-label", words);
+    if (element.matches("input[type=search], #name")) element.setAttribute("placeholder", words);
   }
-  for (const element of part.querySelectorAll("[data-title]")) {
-    element.title = say(element.dataset.title);
-    element.setAttribute("aria-label", say(element.dataset.title));
+  for (const { element, words } of all("data-title")) {
+    element.setAttribute("title", words);
+    element.setAttribute("aria-label", words);
   }
 }
 
-/** Changes a text only where it is another one: a live region would say it again. */
+/**
+ * Changes a text only where it is another one: a live region would say it again.
+ *
+ * @param {Element} element
+ * @param {string} text
+ */
 export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
