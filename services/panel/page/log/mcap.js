@@ -3,6 +3,9 @@
 //   magic, header, chunk { schemas, channels, messages }, message indexes, end of data,
 //   schemas, channels, statistics, chunk index, footer, magic
 
+/** @typedef {{ at: number, value: unknown }} Message `at` is in ms since 1970. */
+/** @typedef {{ topic: string, schema: { title: string } & Record<string, unknown>, messages: Message[] }} Channel `schema` is a JSON Schema. */
+
 const MAGIC = [0x89, 0x4d, 0x43, 0x41, 0x50, 0x30, 0x0d, 0x0a];
 const HEADER = 1;
 const FOOTER = 2;
@@ -18,8 +21,9 @@ const DATA_END = 15;
 /**
  * The bytes of a file.
  *
- * `channels` are {topic, schema, messages}: `schema` is a JSON Schema with a title, `messages` are
- * {at, value}, in the order of `at`, in ms since 1970.
+ * @param {string} library the name of what writes it
+ * @param {Channel[]} channels
+ * @returns {Uint8Array<ArrayBuffer>}
  */
 export function mcap(library, channels) {
   const file = new Bytes().raw(MAGIC);
@@ -32,16 +36,17 @@ export function mcap(library, channels) {
     described.record(CHANNEL, new Bytes().u16(id).u16(id).text(topic).text("json").u32(0));
   });
   const chunk = new Bytes().raw(described.done());
+  /** @type {[bigint, number][][]} */
   const indexes = channels.map(() => []);
   const all = channels.flatMap(({ messages }, channel) => messages.map((message, number) => ({ channel, number, ...message })));
   all.sort((a, b) => a.at - b.at);
   for (const { channel, number, at, value } of all) {
-    indexes[channel].push([nanoseconds(at), chunk.length]);
+    indexes[channel]?.push([nanoseconds(at), chunk.length]);
     const times = new Bytes().u16(channel + 1).u32(number + 1).u64(nanoseconds(at)).u64(nanoseconds(at));
     chunk.record(MESSAGE, times.raw(encode(JSON.stringify(value))));
   }
   const records = chunk.done();
-  const [first, last] = [all[0], all.at(-1)].map((message) => nanoseconds(message?.at ?? 0));
+  const [first, last] = [nanoseconds(all[0]?.at ?? 0), nanoseconds(all.at(-1)?.at ?? 0)];
   const chunkStart = file.length;
   file.record(CHUNK, new Bytes().u64(first).u64(last).u64(records.length).u32(crc32(records)).text("").u64(records.length).raw(records));
   const indexStart = file.length;
@@ -68,10 +73,12 @@ export function mcap(library, channels) {
   return file.raw(footer).u32(crc32(summary)).raw(MAGIC).done();
 }
 
+/** @param {number} at */
 function nanoseconds(at) {
   return BigInt(Math.round(at)) * 1_000_000n;
 }
 
+/** @param {string} text */
 function encode(text) {
   return new TextEncoder().encode(text);
 }
@@ -88,6 +95,11 @@ class Bytes {
     return this.bytes.subarray(0, this.length);
   }
 
+  /**
+   * Room at the end for so many more.
+   *
+   * @param {number} more
+   */
   room(more) {
     if (this.length + more > this.bytes.length) {
       const larger = new Uint8Array(Math.max(2 * this.bytes.length, this.length + more));
@@ -98,32 +110,41 @@ class Bytes {
     return new DataView(this.bytes.buffer, this.length - more, more);
   }
 
+  /** @param {ArrayLike<number>} bytes */
   raw(bytes) {
     this.room(bytes.length);
     this.bytes.set(bytes, this.length - bytes.length);
     return this;
   }
 
+  /** @param {number} value */
   u16(value) {
     this.room(2).setUint16(0, value, true);
     return this;
   }
 
+  /** @param {number} value */
   u32(value) {
     this.room(4).setUint32(0, value, true);
     return this;
   }
 
+  /** @param {number | bigint} value */
   u64(value) {
     this.room(8).setBigUint64(0, BigInt(value), true);
     return this;
   }
 
+  /** @param {string} value */
   text(value) {
     const bytes = encode(value);
     return this.u32(bytes.length).raw(bytes);
   }
 
+  /**
+   * @param {number} operation
+   * @param {Bytes} content
+   */
   record(operation, content) {
     return this.raw([operation]).u64(content.length).raw(content.done());
   }
@@ -135,8 +156,9 @@ const CRC = Uint32Array.from({ length: 256 }, (_, byte) => {
   return rest;
 });
 
+/** @param {Uint8Array} bytes */
 function crc32(bytes) {
   let rest = ~0;
-  for (const byte of bytes) rest = (rest >>> 8) ^ CRC[(rest ^ byte) & 0xff];
+  for (const byte of bytes) rest = (rest >>> 8) ^ (CRC[(rest ^ byte) & 0xff] ?? 0);
   return ~rest >>> 0;
 }

@@ -4,6 +4,9 @@
 // Lengths and angles are those of the simulator's world (firmware/plant/src/arm.rs); of another arm
 // the drawing shows the right joints bent the right way.
 
+/** @import { Robot } from "../station/robot.js" */
+/** @typedef {(number | null)[]} Positions Of the servos; of one that is not heard it is null. */
+
 import { make } from "../parts/svg.js";
 import { say } from "../words/words.js";
 
@@ -17,7 +20,11 @@ const FOREARM = 150;
 /** The claw's position at which its jaws meet, and mm for each further unit. */
 const CLOSED = 210;
 const GAP = 80 / 302;
-/** Joint: its word, its servos by index. */
+/**
+ * Joint: its word, its servos by index.
+ *
+ * @type {[string, [number, ...number[]]][]}
+ */
 const JOINTS = [
   ["base", [0]], ["shoulder", [1, 2]], ["elbow", [3, 4]], ["wrist", [5]], ["rotation", [6]], ["claw", [7]],
 ];
@@ -25,11 +32,13 @@ const JOINTS = [
 const ERRORS = ["voltage", "angle", "heat", "range", "checksum", "overload", "instruction"];
 
 export class Arm {
+  /** @param {SVGElement} svg */
   constructor(svg) {
     this.svg = svg;
-    this.shown = null;
+    this.shown = "";
   }
 
+  /** @param {Robot | null} robot */
   draw(robot) {
     const { servos = "", loads = "", servo_errors: errors = "" } = robot?.state ?? {};
     const shown = [servos, loads, errors, document.documentElement.lang].join(" ");
@@ -47,16 +56,23 @@ export class Arm {
     if (told.length) make("text", { class: "wrong", x: 0, y: 134 }, this.svg, `! ${told.map((word) => say(`servo_${word}`)).join(", ")}`);
   }
 
+  /** @param {Positions} positions */
   fromTheSide(positions) {
     const side = make("g", { transform: "translate(36 108) scale(0.2 -0.2)" }, this.svg);
     const [elbow, claw] = bent(positions);
     make("path", { class: "ground", d: "M-150 0H310" }, side);
     make("path", { class: "stand", d: `M0 0V${SHOULDER_HEIGHT}` }, side);
     make("polyline", { class: "links", points: `0,${SHOULDER_HEIGHT} ${elbow} ${claw}` }, side);
-    for (const [cx, cy] of [[0, SHOULDER_HEIGHT], elbow, claw]) make("circle", { cx, cy, r: 14 }, side);
+    /** @type {[number, number][]} */
+    const joints = [[0, SHOULDER_HEIGHT], elbow, claw];
+    for (const [cx, cy] of joints) make("circle", { cx, cy, r: 14 }, side);
   }
 
-  /** Where the base points, and how far the jaws are apart. */
+  /**
+   * Where the base points, and how far the jaws are apart.
+   *
+   * @param {Positions} positions
+   */
   fromAbove(positions) {
     const { degrees, gap } = turned(positions);
     const above = make("g", { transform: `translate(126 88) rotate(${degrees.toFixed(1)}) scale(0.6)` }, this.svg);
@@ -66,6 +82,13 @@ export class Arm {
     make("path", { class: "links", d: `M${-half} -60V-46H${half}V-60` }, above);
   }
 
+  /**
+   * @param {number} line
+   * @param {string} word
+   * @param {[number, ...number[]]} servos
+   * @param {Positions} positions
+   * @param {number[]} loads
+   */
   joint(line, word, [index, ...others], positions, loads) {
     const y = 12 + line * 19;
     make("text", { x: 166, y: y + 4 }, this.svg, say(`servo_${word}`));
@@ -80,24 +103,42 @@ export class Arm {
   }
 }
 
-/** The servos' positions from their text; one that is not heard is null. */
+/**
+ * The servos' positions from their text.
+ *
+ * @param {string} servos
+ * @returns {Positions}
+ */
 const read = (servos) => (servos ? servos.split(",").map((text) => (text === "-" ? null : Number(text))) : []);
 
-/** Where elbow and claw are seen from the side, in mm from the foot of the base. */
+/**
+ * Where elbow and claw are seen from the side, in mm from the foot of the base.
+ *
+ * @param {Positions} positions
+ * @returns {[[number, number], [number, number]]}
+ */
 function bent(positions) {
   const upper = Math.PI / 2 + angle(positions[1]);
   const fore = upper - Math.PI / 2 + angle(positions[3]);
-  const elbow = [UPPER_ARM * Math.cos(upper), SHOULDER_HEIGHT + UPPER_ARM * Math.sin(upper)];
-  return [elbow, [elbow[0] + FOREARM * Math.cos(fore), elbow[1] + FOREARM * Math.sin(fore)]];
+  const [x, y] = [UPPER_ARM * Math.cos(upper), SHOULDER_HEIGHT + UPPER_ARM * Math.sin(upper)];
+  return [[x, y], [x + FOREARM * Math.cos(fore), y + FOREARM * Math.sin(fore)]];
 }
 
-/** How far the base is turned to the right, in degrees, and how far the jaws are apart, in mm. */
+/**
+ * How far the base is turned to the right, in degrees, and how far the jaws are apart, in mm.
+ *
+ * @param {Positions} positions
+ */
 function turned(positions) {
   const degrees = (-angle(positions[0]) * 180) / Math.PI;
   return { degrees, gap: Math.max(0, ((positions[7] ?? CLOSED) - CLOSED) * GAP) };
 }
 
-/** The arm from above, for the map: as `turned`, and how far the claw reaches ahead of the base, in mm; null if unheard. */
+/**
+ * The arm from above, for the map: as `turned`, and how far the claw reaches ahead of the base, in mm; null if unheard.
+ *
+ * @param {string} servos
+ */
 export function above(servos) {
   const positions = read(servos);
   if (!positions.length) return null;
@@ -105,4 +146,5 @@ export function above(servos) {
   return { ...turned(positions), reach };
 }
 
+/** @param {number | null | undefined} position */
 const angle = (position) => ((position ?? CENTRE) - CENTRE) * UNIT;

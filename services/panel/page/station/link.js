@@ -189,10 +189,10 @@ export class Link extends EventTarget {
     const [word, first = "", ...rest] = line.split(" ");
     if (word === "from") {
       const [what = "", ...more] = rest;
-      report(this.robot(first), what, more);
+      report(this.robot(first), what, more, performance.now(), Date.now());
     } else if (word === "past") {
       const [age, what = "", ...more] = rest;
-      report(this.robot(first), what, more, Number(age));
+      report(this.robot(first), what, more, performance.now(), Date.now() - Number(age));
     } else if (word === "about") {
       this.about(this.robot(first), fields(rest));
     } else if (word === "answer") {

@@ -27,10 +27,10 @@ function groups(words, size) {
 /**
  * Those that tell what is so now, by their first word. Before a list stands the number of its items.
  *
- * @type {Record<string, (robot: Robot, words: string[], now: number) => void>}
+ * @type {Record<string, (robot: Robot, words: string[], now: number, at: number) => void>}
  */
 const NOW = {
-  state: (robot, words, now) => robot.become(fields(words), now),
+  state: (robot, words, now, at) => robot.become(fields(words), now, at),
   route(robot, [, ...words]) {
     robot.route = groups(words, 2).map(([x, y]) => [Number(x), Number(y)]);
   },
@@ -68,11 +68,12 @@ const NOW = {
  * @param {Robot} robot
  * @param {string} word the first word of the line
  * @param {string[]} rest
- * @param {number} [age] how long ago it was, in ms
+ * @param {number} now when it came, by this page's clock
+ * @param {number} at when it was so, in ms since 1970
  */
-export function report(robot, word, rest, age = 0) {
-  if (Object.hasOwn(NOW, word)) return NOW[word]?.(robot, rest, performance.now());
-  const entry = note(robot, word, rest, Date.now() - age);
+export function report(robot, word, rest, now, at) {
+  if (Object.hasOwn(NOW, word)) return NOW[word]?.(robot, rest, now, at);
+  const entry = note(robot, word, rest, at);
   if (entry) follow(robot, entry);
 }
 

@@ -117,7 +117,11 @@ export class Robot {
     this.past = [];
     /** States heard in all. */
     this.total = 0;
-    /** @type {number | null} */
+    /**
+     * In ms since 1970.
+     *
+     * @type {number | null}
+     */
     this.stoppedSince = null;
     /** @type {Entry[]} */
     this.events = [];
@@ -175,13 +179,14 @@ export class Robot {
   }
 
   /**
-   * Takes over a state that has just come.
+   * Takes over a state.
    *
    * @param {State} state
-   * @param {number} now
+   * @param {number} now when it came, by this page's clock
+   * @param {number} at when it was so, in ms since 1970
    */
-  become(state, now) {
-    this.stoppedSince = state.stop_age_ms === undefined ? null : Date.now() - Number(state.stop_age_ms);
+  become(state, now, at) {
+    this.stoppedSince = state.stop_age_ms === undefined ? null : at - Number(state.stop_age_ms);
     this.stray(state, now);
     this.state = state;
     this.stated = now;
