@@ -145,7 +145,9 @@ export class Link extends EventTarget {
       return Promise.resolve(this.noted(robot, { refused: "lost", unsent: true }));
     }
     this.send(verb, robot, number, rest);
-    return new Promise((settle) => this.waiting.set(String(number), (answer) => settle(this.noted(robot, answer))));
+    return new Promise((settle) => {
+      this.waiting.set(String(number), (answer) => settle(this.noted(robot, answer)));
+    });
   }
 
   /**

@@ -41,7 +41,7 @@
  */
 
 /** Older than this, in ms, nothing is shown as true. */
-export const STALE_MS = 500;
+const STALE_MS = 500;
 /** How long trail and strips look back, in ms. */
 export const SPAN_MS = 60_000;
 
