@@ -60,14 +60,25 @@ fn folder(package: &Value) -> PathBuf {
 
 /// Every Rust file below `folder` that git would see.
 fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    files(folder, &["rs"])
+}
+
+/// Every file below `folder` that git would see and whose name ends so.
+fn files(folder: &Path, ends: &[&str]) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![root().join(folder)];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).expect("a readable folder") {
             let path = entry.expect("an entry").path();
-            if path.is_dir() && !path.ends_with("target") {
+            let is_made = ["target", "node_modules"]
+                .iter()
+                .any(|made| path.ends_with(made));
+            if path.is_dir() && !is_made {
                 folders.push(path);
-            } else if path.extension().is_some_and(|end| end == "rs") {
+            } else if path
+                .extension()
+                .is_some_and(|end| ends.iter().any(|one| end == *one))
+            {
                 files.push(path);
             }
         }

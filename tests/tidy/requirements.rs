@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::{root, rust_files};
+use crate::{files, root, rust_files};
 
 /// The letters with which ids begin; a number follows each letter but `K`.
 const FAMILIES: &str = "OPSXUDCLMGQTWABFE";
@@ -129,7 +129,7 @@ fn each_row_names_tests_that_exist_or_a_departure() {
 /// The files whose text users read: the page, and the documents for users of the robot.
 #[test]
 fn people_who_use_the_robot_meet_no_id() {
-    let mut files = vec![
+    let mut shown = vec![
         root().join("README.md"),
         root().join("bus/orders/sentences.txt"),
     ];
@@ -138,15 +138,10 @@ fn people_who_use_the_robot_meet_no_id() {
         "services/station",
         "services/recorder",
     ] {
-        let entries = std::fs::read_dir(root().join(folder)).expect("a folder");
-        let paths = entries.map(|entry| entry.expect("an entry").path());
-        files.extend(paths.filter(|path| {
-            let end = path.extension().and_then(|end| end.to_str());
-            matches!(end, Some("js" | "html" | "css" | "md"))
-        }));
+        shown.extend(files(Path::new(folder), &["js", "html", "css", "md"]));
     }
-    assert!(files.len() > 10, "the page is somewhere else: {files:?}");
-    for file in files {
+    assert!(shown.len() > 30, "the page is somewhere else: {shown:?}");
+    for file in shown {
         let text = std::fs::read_to_string(&file).expect("a readable file");
         let is_comment = |line: &str| {
             let line = line.trim_start();
