@@ -126,6 +126,7 @@ at("name").onchange = () => {
   at("name").value = at("name").value.trim().replaceAll(" ", "-");
   link.rename(at("name").value);
 };
+at("reload").onclick = () => location.reload();
 at("language").onclick = () => {
   change();
   translate();
@@ -252,7 +253,7 @@ function drawRest(shown, time) {
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
 /** The control of this page that ends what is wrong, by the name of the remedy. */
-const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup" };
+const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup", reload: "reload" };
 
 /** Beside the sentence that names a remedy stands a button that does it, or shows where it is done. */
 function drawRemedy({ remedy }) {

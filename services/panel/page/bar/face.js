@@ -32,7 +32,8 @@ export function face(link, robot, now) {
   if (!link.open && link.me === null && link.tries === 0) return { look: "none", said: sentence("face_connecting") };
   if (!link.open || (robot && (robot.speaks || !robot.connected) && robot.isStale(now))) {
     const why = link.open ? sentence("face_unheard", { robot: robot.name }) : lost(link);
-    if (!robot) return { look: "unheard", said: why };
+    const remedy = !link.open && link.closed === "other_language" ? "reload" : null;
+    if (!robot) return { look: "unheard", said: why, remedy };
     const old = [robot.heard, robot.stated].filter(Number.isFinite);
     const heard = old.length ? age(now - Math.min(...old)) : null;
     const before = does(robot).join(", ");
@@ -44,6 +45,7 @@ export function face(link, robot, now) {
       isDeaf: link.open && !robot.connected,
       more: sentences(link.open && heard ? null : last, before && sentence("face_before", { before })),
       chip: heard && sentence("face_seen", { age: heard }),
+      remedy,
     };
   }
   if (!robot) return { look: "none", said: named() && link.me ? say("not_here", named()) : say("no_robot") };

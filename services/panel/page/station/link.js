@@ -122,7 +122,9 @@ export class Link extends EventTarget {
     const url = new URL("live", location.href);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
     url.hash = "";
-    url.search = new URLSearchParams(localStorage.getItem("name") ? { name: localStorage.getItem("name") } : {});
+    const { edition } = document.documentElement.dataset;
+    const name = localStorage.getItem("name");
+    url.search = new URLSearchParams({ edition, ...(name && { name }) });
     const socket = new WebSocket(url);
     this.socket = socket;
     socket.onopen = () => {
