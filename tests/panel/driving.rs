@@ -175,7 +175,7 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
 ) {
     scene.arm(page);
     scene.hold(page, "ArrowLeft");
-    let frozen = scene.freeze_comm();
+    let frozen = scene.freeze("comm");
     page.wait_for("#state", "r1 is not heard");
     page.wait_until("document.body.classList.contains('stale')");
     let grey = "['.robot path', '.good rect', '.ghost path', '.unsure'].every((part) => { \

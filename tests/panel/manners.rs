@@ -358,7 +358,7 @@ fn an_accessibility_checker_finds_nothing_serious() {
     page.wait_for("#stop-said", "both wheels stand");
     check(&mut page, "stopped");
     scene.resume();
-    let frozen = scene.freeze_comm();
+    let frozen = scene.freeze("comm");
     page.wait_for("#state", "r1 is not heard");
     for tab in TABS {
         page.click(&format!("#tab-{tab}"));

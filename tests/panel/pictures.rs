@@ -69,7 +69,7 @@ fn of_every_view() {
     }
     let params = serde_json::json!({ "type": "none" });
     page.call("Emulation.setEmulatedVisionDeficiency", &params);
-    let frozen = scene.freeze_comm();
+    let frozen = scene.freeze("comm");
     page.wait_for("#state", "r1 is not heard");
     view(&mut page, "link-lost");
     drop(frozen);

@@ -34,10 +34,10 @@ pub(crate) struct Scene {
     pub(crate) domain: Domain,
 }
 
-/// A frozen comm; dropping this lets it run again.
-pub(crate) struct FrozenComm([Pid; 3]);
+/// A frozen service; dropping this lets it run again.
+pub(crate) struct Frozen([Pid; 3]);
 
-impl Drop for FrozenComm {
+impl Drop for Frozen {
     fn drop(&mut self) {
         for process in self.0.into_iter().rev() {
             let _ = kill_process(process, Signal::CONT);
@@ -164,10 +164,10 @@ impl Scene {
         });
     }
 
-    /// Freezes comm and the supervisor, which would replace a comm that is silent for 2 s.
-    pub(crate) fn freeze_comm(&self) -> FrozenComm {
+    /// Freezes a service and the supervisor, which would replace a service that is silent for 2 s.
+    pub(crate) fn freeze(&self, name: &str) -> Frozen {
         let service = |name: &str| pid(self.up.service(name).expect("it runs"));
-        let frozen = FrozenComm([pid(self.up.pid()), service("attend"), service("comm")]);
+        let frozen = Frozen([pid(self.up.pid()), service("attend"), service(name)]);
         for process in frozen.0 {
             kill_process(process, Signal::STOP).expect("it runs");
         }

@@ -5,7 +5,8 @@
 //! difference in the last [`SPAN`] belongs to a line that nothing has delayed. A line with a
 //! greater difference was delayed by the excess. Two clocks drift apart, so the panel forgets the
 //! smallest difference after a while. A page says `here` once a second, so new differences keep
-//! coming.
+//! coming. A longer time without one does not count: then the panel itself was held up, and the
+//! lines that wait for it are late.
 
 use core::time::Duration;
 
@@ -13,11 +14,16 @@ use core::time::Duration;
 /// network synchronises drift apart by less than 20 ms.
 const SPAN: Duration = Duration::from_secs(20);
 
+/// A longer time without a line does not count.
+const GAP: Duration = Duration::from_secs(2);
+
 /// The differences between the clocks of one page and of the panel.
 #[derive(Debug, Default)]
 pub struct Late {
     /// When the present span began.
     began: Duration,
+    /// When the last line came.
+    heard: Duration,
     /// The smallest differences of the span before and of this one, in ms.
     least: [Option<i64>; 2],
 }
@@ -26,6 +32,11 @@ impl Late {
     /// How much later than others a line has come at `now`, if the page sent it at `said_ms` of its
     /// clock.
     pub fn hear(&mut self, said_ms: u32, now: Duration) -> Duration {
+        let gap = now.saturating_sub(self.heard);
+        self.heard = now;
+        if gap > GAP {
+            self.began += gap;
+        }
         let spans = now.saturating_sub(self.began).as_secs() / SPAN.as_secs();
         if spans > 0 {
             self.began = now;
@@ -65,6 +76,21 @@ mod tests {
     }
 
     #[test]
+    fn what_has_waited_for_a_panel_that_was_held_up_is_late_however_long_that_was() {
+        for seconds in [5, 30, 90, 3_600] {
+            let mut late = Late::default();
+            let page = 70_000;
+            assert_eq!(late.hear(page, at(1_000)), at(0));
+            let now = at(1_000 + seconds * 1_000);
+            for second in 1..seconds {
+                let said = page + u32::try_from(second * 1_000).unwrap();
+                let waited = at((seconds - second) * 1_000);
+                assert_eq!(late.hear(said, now), waited, "{second} s of {seconds} s");
+            }
+        }
+    }
+
+    #[test]
     fn clocks_that_drift_apart_make_nothing_late() {
         let mut late = Late::default();
         // A tuned clock is wrong by one second in ten thousand at worst; this is five times as bad.
@@ -79,13 +105,5 @@ mod tests {
                 / 100,
             7
         );
-    }
-
-    #[test]
-    fn the_first_line_after_a_long_silence_is_the_measure() {
-        let mut late = Late::default();
-        late.hear(0, at(0));
-        assert_eq!(late.hear(100_000, at(109_000)), at(0));
-        assert_eq!(late.hear(100_100, at(109_400)), at(300));
     }
 }

@@ -98,6 +98,7 @@ at("autonomous").onclick = () => {
   else act("mode autonomous");
 };
 at("where-ask").onclick = () => link.warehouse && where.ask();
+at("reload").onclick = () => location.reload();
 at("language").onclick = () => {
   change();
   translate();

@@ -53,7 +53,7 @@ use thiserror::Error;
 use tokio::sync::{Semaphore, watch};
 
 pub use access::Tokens;
-use access::{Access, Rank};
+use access::{Access, Rank, said};
 use handover::Handover;
 
 /// Pages that may look at once.
@@ -254,14 +254,23 @@ async fn file(
     let Some((kind, content)) = page::file(path, &robot) else {
         return refuse(StatusCode::NOT_FOUND, Code::NoFile);
     };
+    // A browser asks each time whether what it has is still so.
+    let tag = format!("\"{}-{robot}\"", *page::EDITION);
+    if text(request.headers(), &header::IF_NONE_MATCH) == Some(&tag) {
+        return guarded(([(header::ETAG, tag)], StatusCode::NOT_MODIFIED).into_response());
+    }
     let takes = text(request.headers(), &header::ACCEPT_ENCODING).unwrap_or_default();
-    let kind = (header::CONTENT_TYPE, kind);
+    let head = [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        (header::ETAG, tag),
+        (header::VARY, "accept-encoding".to_owned()),
+    ];
     guarded(match takes.contains("deflate") {
         true => {
-            let packed = (header::CONTENT_ENCODING, "deflate");
-            ([kind, packed], page::packed(path, &content)).into_response()
+            let packed = [(header::CONTENT_ENCODING, "deflate")];
+            (head, packed, page::packed(path, &content)).into_response()
         }
-        false => ([kind], content).into_response(),
+        false => (head, content).into_response(),
     })
 }
 
@@ -394,7 +403,12 @@ async fn live(
     let Some(rank) = rank(&shared.access, &headers) else {
         return refuse(StatusCode::FORBIDDEN, Code::NoToken);
     };
-    let Some(page) = OpenPage::take(&shared, query.as_deref().unwrap_or_default()) else {
+    let query = query.unwrap_or_default();
+    // It was opened before this program was replaced, and may mean other things by the same words.
+    if said(&query, "edition").is_some_and(|edition| edition != *page::EDITION) {
+        return upgrade.on_upgrade(|socket| socket::send_away(socket, Code::OtherLanguage));
+    }
+    let Some(page) = OpenPage::take(&shared, said(&query, "name").unwrap_or_default()) else {
         return refuse(StatusCode::SERVICE_UNAVAILABLE, Code::PagesFull);
     };
     visitor.let_stay();

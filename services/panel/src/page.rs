@@ -3,6 +3,7 @@
 //! before that script runs.
 
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use lager_floor::SideLength;
@@ -70,6 +71,14 @@ static TABLE: LazyLock<String> = LazyLock::new(|| {
     format!("export const TABLE = {table};\nexport const LIMITS = {limits};\n")
 });
 
+/// Which edition of the page this program has, as a hash of all its files. A page that a browser
+/// opened before the program was replaced has another one.
+pub(crate) static EDITION: LazyLock<String> = LazyLock::new(|| {
+    let mut hasher = DefaultHasher::new();
+    (FILES, &*TABLE).hash(&mut hasher);
+    format!("{:016x}", hasher.finish())
+});
+
 /// A file as it is written.
 fn written(name: &str) -> Option<&'static str> {
     if name == "words/table.js" {
@@ -94,7 +103,10 @@ pub(crate) fn file(path: &str, robot: &str) -> Option<(&'static str, String)> {
     }
     let content = written(name)?;
     Some(match name.rsplit_once('.')?.1 {
-        "html" => (HTML, content.replace("{robot}", robot)),
+        "html" => {
+            let content = content.replace("{robot}", robot);
+            (HTML, content.replace("{edition}", &EDITION))
+        }
         "css" => (STYLE, content.to_owned()),
         _ => (SCRIPT, content.to_owned()),
     })

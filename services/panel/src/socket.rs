@@ -42,12 +42,20 @@ pub(crate) async fn converse(socket: WebSocket, page: OpenPage, rank: Rank) {
     // Before the page is told, which may take its time: whoever drove drives no more.
     drop(visit);
     if let Some(why) = why {
-        let frame = CloseFrame {
-            code: close_code::POLICY,
-            reason: Utf8Bytes::from_static(why.as_str()),
-        };
-        let _ = timeout(SLOW, sink.send(Message::Close(Some(frame)))).await;
+        let _ = timeout(SLOW, sink.send(closed(why))).await;
     }
+}
+
+/// Tells a page with which the panel does not talk why.
+pub(crate) async fn send_away(mut socket: WebSocket, why: Code) {
+    let _ = timeout(SLOW, socket.send(closed(why))).await;
+}
+
+fn closed(why: Code) -> Message {
+    Message::Close(Some(CloseFrame {
+        code: close_code::POLICY,
+        reason: Utf8Bytes::from_static(why.as_str()),
+    }))
 }
 
 /// Carries out what the page says; why it is closed, if that is to be told.

@@ -16,7 +16,7 @@ use lager_lines::Name;
 use lager_orders::{Language, Sentence};
 use lager_station::{Awaited, Doing, Handle, Reply};
 
-use crate::access::person;
+use crate::access::{person, said};
 
 /// How long a robot has to confirm a stop.
 const CONFIRM: Duration = Duration::from_secs(1);
@@ -81,8 +81,8 @@ pub(crate) fn names(body: &str) -> Vec<String> {
 
 /// Who presses: the name that the person has chosen.
 pub(crate) fn by(body: &str) -> String {
-    let mut fields = body.split('&');
-    fields.find_map(person).unwrap_or_else(|| FORM.to_owned())
+    let name = said(body, "name").and_then(person);
+    name.unwrap_or_else(|| FORM.to_owned())
 }
 
 /// Stops these robots, or all if none is named, in this person's name, and waits for what becomes of

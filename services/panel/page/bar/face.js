@@ -62,9 +62,10 @@ export const age = (ms) => (ms < 60_000 ? `${Math.max(0, Math.floor(ms / 1_000))
  */
 export function face(link, robot, now) {
   if (!link.open && link.me === null && link.tries === 0) return { look: "none", said: sentence("face_connecting") };
-  if (!link.open && !robot) return { look: "unheard", said: lost(link) };
+  if (!link.open && !robot) return { look: "unheard", said: lost(link), remedy: tooOld(link) };
   if (robot && (!link.open || ((robot.speaks || !robot.connected) && robot.isStale(now)))) {
     const why = link.open ? sentence("face_unheard", { robot: robot.name }) : lost(link);
+    const remedy = tooOld(link);
     const old = [robot.heard, robot.stated].filter(Number.isFinite);
     const heard = old.length ? age(now - Math.min(...old)) : null;
     const before = does(robot).join(", ");
@@ -76,6 +77,7 @@ export function face(link, robot, now) {
       isDeaf: link.open && !robot.connected,
       more: sentences(link.open && heard ? null : last, before && sentence("face_before", { before })),
       chip: heard && sentence("face_seen", { age: heard }),
+      remedy,
     };
   }
   const wanted = link.me && named();
@@ -178,6 +180,13 @@ function stopper(link, { state: { stop_cause: cause, stop_by: by }, events, stop
  * @param {Robot} robot
  */
 export const causeOf = ({ state: { stop_cause: cause } }) => (cause !== "none" && sentence(`stop_cause_${cause}`)) || "";
+
+/**
+ * The remedy of a page that is of another version than the panel.
+ *
+ * @param {Pick<Link, "open" | "closed">} link
+ */
+const tooOld = (link) => (!link.open && link.closed === "other_language" ? "reload" : null);
 
 /**
  * Why there is no connection.

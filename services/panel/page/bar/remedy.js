@@ -10,7 +10,7 @@ import { put } from "../words/words.js";
  *
  * @type {Record<string, string>}
  */
-const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup" };
+const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup", reload: "reload" };
 
 /** @param {Face} face */
 export function drawRemedy({ remedy }) {

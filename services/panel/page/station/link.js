@@ -85,8 +85,9 @@ export class Link extends EventTarget {
     const url = new URL("live", location.href);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
     url.hash = "";
+    const { edition = "" } = document.documentElement.dataset;
     const name = localStorage.getItem("name");
-    url.search = name ? String(new URLSearchParams({ name })) : "";
+    url.search = String(new URLSearchParams({ edition, ...(name && { name }) }));
     const socket = new WebSocket(url);
     socket.onopen = () => {
       this.open = true;

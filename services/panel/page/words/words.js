@@ -59,6 +59,7 @@ const WORDS = {
     delivered_here: "Delivery", flag_next: "next {0}", flag_blocked: "blocked {0} s", legend: "Legend", legend_robot: "the robot", legend_unsure: "where it may be",
     legend_route: "its route; the ring is the next crossing", legend_trail: "where it has driven", legend_goods: "goods", legend_ordered: "goods that are ordered, with their turn",
     legend_gone: "goods that are not in their place", map_how: "Arrows choose goods, crossings and ways; the tip says what Enter does there. With Shift the arrows move the map, plus and minus zoom.",
+    reload: "Load the page anew",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -115,6 +116,7 @@ const WORDS = {
     flag_blocked: "spärrad {0} s", legend: "Teckenförklaring", legend_robot: "roboten", legend_unsure: "där den kan vara", legend_route: "dess väg; ringen är nästa korsning",
     legend_trail: "där den har kört", legend_goods: "vara", legend_ordered: "beställd vara, med sin tur", legend_gone: "vara som inte är på sin plats",
     map_how: "Pilarna väljer varor, korsningar och vägar; rutan säger vad Enter gör där. Med Skift flyttar pilarna kartan, plus och minus zoomar.",
+    reload: "Ladda om sidan",
   },
 };
 

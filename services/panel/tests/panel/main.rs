@@ -7,6 +7,7 @@ mod stop;
 mod wheel;
 
 use scene::{Running, status};
+use tungstenite::Message;
 
 #[test]
 fn the_page_comes_with_what_keeps_others_out() {
@@ -48,6 +49,36 @@ fn an_address_with_a_token_leads_to_the_same_page_without_it() {
         assert_eq!(head(&answer, "location"), leads, "{asked}");
         assert!(head(&answer, "set-cookie").contains(token), "{asked}");
     }
+}
+
+#[test]
+fn what_a_browser_has_is_sent_once_and_a_page_of_another_version_is_sent_away() {
+    let panel = Running::new();
+    let (host, cookie) = (panel.host(), panel.cookie());
+    for path in ["/", "/main.js", "/style.css"] {
+        let answer = panel.ask_as_driver(path);
+        let tag = head(&answer, "etag");
+        assert_eq!(head(&answer, "cache-control"), "no-cache");
+        let has = |tag: &str| {
+            let headers = [
+                ("Host", &*host),
+                ("Cookie", &cookie),
+                ("If-None-Match", tag),
+            ];
+            status(&panel.ask(path, &headers))
+        };
+        assert_eq!((has(tag), has("\"older\"")), (304, 200), "{path}");
+    }
+    let answer = panel.ask_as_driver("/");
+    let (_, edition) = answer.split_once("data-edition=\"").unwrap();
+    let (edition, _) = edition.split_once('"').unwrap();
+    let origin = format!("http://{host}");
+    let page = |edition| panel.page_of(&format!("Bo&edition={edition}"), &origin, &cookie);
+    assert_eq!(page(edition).unwrap().line("you").unwrap(), "you Bo driver");
+    let Ok(Message::Close(Some(frame))) = page("older").unwrap().0.read() else {
+        panic!("the panel talks with a page of another version");
+    };
+    assert_eq!(frame.reason.as_str(), "other_language");
 }
 
 #[test]
