@@ -1,7 +1,9 @@
 // The last minute as strips of a few figures, and the eleven line sensors as a bar.
 //
 // A strip moves with every picture of the screen. It is not drawn anew for that: what is there is
-// shifted by the pixels that time has passed, and what is new is drawn at its end.
+// shifted by the pixels that time has passed, and what is new is drawn at its end. The library of plots that
+// the view of signals has would draw each strip anew for every picture, and would have to be loaded before the
+// page's first view.
 
 import { SPAN_MS } from "../station/link.js";
 import { decimal, put, say } from "../words/words.js";
@@ -29,8 +31,9 @@ export function sensors({ line_bits: bits, line_error: error } = {}) {
 }
 
 export class Strips {
-  constructor(parent) {
-    this.strips = STRIPS.map((strip) => new Strip(parent, ...strip));
+  /** `open` shows the lane of a strip that somebody has clicked, by its word. */
+  constructor(parent, open) {
+    this.strips = STRIPS.map((strip) => new Strip(parent, open, ...strip));
     const [figure, row] = [document.createElement("figure"), document.createElement("div")];
     figure.id = "sensors";
     this.caption = document.createElement("figcaption");
@@ -70,12 +73,16 @@ function told(figures, unit) {
 }
 
 class Strip {
-  constructor(parent, word, unit, low, high, keys) {
+  constructor(parent, open, word, unit, low, high, keys) {
     Object.assign(this, { word, unit, low, high, keys });
-    const figure = document.createElement("figure");
-    this.caption = document.createElement("figcaption");
+    const [figure, caption] = [document.createElement("figure"), document.createElement("figcaption")];
+    this.caption = document.createElement("button");
+    this.caption.type = "button";
+    this.caption.dataset.lane = word;
+    this.caption.onclick = () => open(word);
+    caption.append(this.caption);
     this.canvas = document.createElement("canvas");
-    figure.append(this.caption, this.canvas);
+    figure.append(caption, this.canvas);
     parent.append(figure);
     this.pen = this.canvas.getContext("2d");
     // To ask for the size would lay the page out each time.

@@ -24,6 +24,8 @@
 // Nothing here draws, and nothing here is kept when the page is closed. The station keeps it, and tells
 // on each connection what has happened; its history (services/panel/src/history.rs) has the last day.
 
+import { Frames, quantile } from "./quantile.js";
+
 /** Older than this, in ms, nothing is shown as true. */
 export const STALE_MS = 500;
 /** How long trail and strips look back, in ms. */
@@ -51,6 +53,8 @@ class Robot {
     this.stated = -Infinity;
     this.truth = null;
     this.latency = null;
+    /** How long frames have taken since the page was opened. */
+    this.frames = new Frames();
     /** What each line sensor has read in the last calibration, the leftmost first. */
     this.sensors = null;
     this.route = [];
@@ -283,6 +287,7 @@ export class Link extends EventTarget {
       robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
     } else if (word === "latency") {
       const [longest, ...counted] = rest.map(Number);
+      robot.frames.add(longest, counted);
       // Without a frame measured there is no new figure.
       if (counted.length > 0) robot.latency = { p50: quantile(0.5, counted, longest), p99: quantile(0.99, counted, longest) };
     } else if (word === "sensors") {
@@ -338,26 +343,6 @@ function stray(robot, { x_mm: x, y_mm: y, heading_deg: heading = 0, unsure_mm: u
     const seconds = Math.max(0, now - robot.stated) / 1_000;
     robot.strayed += Math.max(Number(left), Number(right)) * MM_PER_DUTY * Math.min(seconds, 60);
   }
-}
-
-/**
- * The time that this part of all frames did not exceed, in us, interpolated within its bucket. `counted` has the
- * number and the count of each bucket in turn.
- */
-function quantile(part, counted, longest) {
-  const upper = (bucket) => (bucket < 1 ? 256 * (bucket + 1) : (5 + ((bucket - 1) % 4)) * 2 ** (6 + Math.floor((bucket - 1) / 4))) / 1_000;
-  const frames = counted.reduce((sum, count, i) => (i % 2 === 1 ? sum + count : sum), 0);
-  let left = Math.max(1, Math.ceil(part * frames));
-  for (let i = 0; i < counted.length; i += 2) {
-    const [bucket, count] = [counted[i], counted[i + 1]];
-    if (left <= count) {
-      const lower = upper(bucket - 1);
-      const end = bucket === 89 ? longest : upper(bucket);
-      return Math.round(Math.min(longest, lower + ((end - lower) * left) / count));
-    }
-    left -= count;
-  }
-  return longest;
 }
 
 /** Keeps what the strips and the trail show. */

@@ -1,0 +1,143 @@
+// What stands beside the lanes: how long the path has taken as a histogram, and what the link has lost.
+
+import { KEPT_MS } from "./figures.js";
+import { micros, ticks, timeOfDay, written } from "./lanes.js";
+import { Box, axis, colours } from "./plot.js";
+import { LAST, upper } from "../station/quantile.js";
+import { Plot } from "../vendor/uplot.js";
+import { put, say } from "../words/words.js";
+
+/** What is marked of all frames: how many of them were at least as fast. */
+const PARTS = { p50: 0.5, p99: 0.99, "p99.9": 0.999 };
+/** Of these a line stands in the picture. */
+const MARKED = ["p50", "p99", "max"];
+
+/**
+ * The steps of a histogram: where each bucket begins, in us, and how many frames it holds.
+ *
+ * @param {number[]} counts of each bucket
+ * @param {number} longest in us
+ * @returns {{ from: number[], counts: number[] }}
+ */
+export function steps(counts, longest) {
+  const first = Math.max(1, counts.findIndex((count) => count > 0));
+  const last = Math.max(first, counts.findLastIndex((count) => count > 0));
+  const buckets = Array.from({ length: last - first + 1 }, (_, index) => first + index);
+  const end = last === LAST ? longest : upper(last);
+  const held = buckets.map((bucket) => counts[bucket]);
+  // The axis has no 0: what is faster than the first of them stands in it.
+  if (first === 1) held[0] += counts[0];
+  return { from: [...buckets.map((bucket) => upper(bucket - 1)), end], counts: [...held, 0] };
+}
+
+/** A text in a new element of the parent. */
+function text(parent, tag, name = "") {
+  const element = document.createElement(tag);
+  element.className = name;
+  parent.append(element);
+  return element;
+}
+
+export class Histogram {
+  constructor(parent) {
+    this.title = text(parent, "h3");
+    this.box = new Box(parent, () => this.options());
+    const list = text(parent, "dl", "marks");
+    this.figures = [...Object.keys(PARTS), "max"].map((name) => {
+      const row = text(list, "div");
+      text(row, "dt").textContent = name;
+      return text(row, "dd");
+    });
+    this.said = text(parent, "p", "quiet");
+    /** @type {Record<string, number>} In us. */
+    this.marks = {};
+  }
+
+  options() {
+    return {
+      padding: [24, 12, 0, 0],
+      cursor: { show: false },
+      scales: {
+        x: { time: false, distr: 3, range: (_, least, most) => [10 ** Math.floor(Math.log10(least ?? 10)), Math.max(most ?? 0, 1_000)] },
+        y: { range: (_, least, most) => [0, Math.max(1, most ?? 1)] },
+      },
+      axes: [
+        axis((_, times) => times.map(micros), { size: 24, splits: ({ scales: { x } }) => decades(x.min, x.max), filter: (_, times) => times }),
+        axis((_, roots) => roots.map((root) => (Number.isInteger(root) ? written(root * root) : "")), { size: 44, space: 28 }),
+      ],
+      series: [{}, { paths: Plot.paths.stepped({ align: 1 }), width: 0, fill: () => colours.accent, points: { show: false } }],
+      hooks: { draw: [(plot) => this.mark(plot)] },
+    };
+  }
+
+  /** @param {import("../station/quantile.js").Frames} frames */
+  draw(frames) {
+    const { counts, longest } = frames;
+    const { from, counts: held } = steps(counts, longest);
+    const total = held.reduce((sum, count) => sum + count, 0);
+    this.marks = Object.fromEntries(Object.entries(PARTS).map(([name, part]) => [name, frames.quantile(part)]));
+    this.marks.max = longest;
+    const data = [from, held.map(Math.sqrt)];
+    this.box.ready(data)?.setData(data);
+    put(this.title, say("path_histogram"));
+    Object.values(this.marks).forEach((us, index) => put(this.figures[index], total ? micros(us) : "\u2013"));
+    put(this.said, total ? say("frames_told", total) : say("frames_none"));
+  }
+
+  /** Draws a line with its name for each mark. */
+  mark({ ctx, bbox, valToPos }) {
+    const ratio = devicePixelRatio;
+    ctx.save();
+    ctx.font = `600 ${12 * ratio}px system-ui, sans-serif`;
+    ctx.textBaseline = "bottom";
+    ctx.fillStyle = colours.ink;
+    let free = -Infinity;
+    for (const name of MARKED) {
+      const x = Math.round(valToPos(this.marks[name], "x", true));
+      if (!(x >= bbox.left && x <= bbox.left + bbox.width + 1)) continue;
+      ctx.fillRect(x, bbox.top - 4 * ratio, ratio, bbox.height + 4 * ratio);
+      const width = ctx.measureText(name).width;
+      const left = Math.max(free, Math.min(x - width / 2, bbox.left + bbox.width - width));
+      ctx.fillText(name, left, bbox.top - 6 * ratio);
+      free = left + width + 6 * ratio;
+    }
+    ctx.restore();
+  }
+}
+
+/** The powers of ten in a range. */
+function decades(least, most) {
+  const all = [];
+  for (let power = Math.ceil(Math.log10(least) - 1e-9); 10 ** power <= most * 1.001; power++) all.push(10 ** power);
+  return all;
+}
+
+export class Losses {
+  constructor(parent) {
+    this.title = text(parent, "h3");
+    this.said = text(parent, "p", "quiet");
+    this.box = new Box(parent, () => ({
+      ms: 1,
+      padding: [8, 12, 0, 0],
+      cursor: { show: false },
+      scales: { x: { time: true, range: (_, least, most) => [least - 30_000, most + 30_000] }, y: { range: (_, least, most) => [0, Math.max(4, most ?? 0)] } },
+      axes: [
+        axis((_, at) => at.map((time) => timeOfDay(time).slice(0, 5)), { size: 24, space: 60, grid: { show: false } }),
+        axis((_, values) => ticks(values), { size: 44, space: 20, incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1_000, 10_000, 100_000] }),
+      ],
+      series: [{}, { paths: Plot.paths.bars({ size: [0.7] }), width: 0, fill: () => colours.accent, points: { show: false } }],
+    }));
+  }
+
+  /**
+   * @param {import("./figures.js").Columns} columns
+   * @param {number} until
+   */
+  draw(columns, until) {
+    const minutes = columns.lostByMinute(until);
+    const data = [minutes.map((_, index) => until - KEPT_MS + (index + 0.5) * 60_000), minutes];
+    this.box.ready(data)?.setData(data);
+    put(this.title, say("lost_by_minute"));
+    put(this.said, say("lost_in_all", minutes.reduce((sum, lost) => sum + lost, 0)));
+  }
+}
