@@ -2,9 +2,10 @@
 
 import { KEPT_MS } from "./figures.js";
 import { micros, ticks, timeOfDay, written } from "./lanes.js";
-import { Box, axis, colours } from "./plot.js";
+import { Box, LETTERS, axis, colours } from "./plot.js";
 import { LAST, upper } from "../station/quantile.js";
 import { Plot } from "../vendor/uplot.js";
+import { add } from "./add.js";
 import { put, say } from "../words/words.js";
 
 /** What is marked of all frames: how many of them were at least as fast. */
@@ -24,46 +25,39 @@ export function steps(counts, longest) {
   const last = Math.max(first, counts.findLastIndex((count) => count > 0));
   const buckets = Array.from({ length: last - first + 1 }, (_, index) => first + index);
   const end = last === LAST ? longest : upper(last);
-  const held = buckets.map((bucket) => counts[bucket]);
   // The axis has no 0: what is faster than the first of them stands in it.
-  if (first === 1) held[0] += counts[0];
+  const held = buckets.map((bucket) => (counts[bucket] ?? 0) + (bucket === 1 ? (counts[0] ?? 0) : 0));
   return { from: [...buckets.map((bucket) => upper(bucket - 1)), end], counts: [...held, 0] };
 }
 
-/** A text in a new element of the parent. */
-function text(parent, tag, name = "") {
-  const element = document.createElement(tag);
-  element.className = name;
-  parent.append(element);
-  return element;
-}
-
 export class Histogram {
+  /** @param {HTMLElement} parent */
   constructor(parent) {
-    this.title = text(parent, "h3");
+    this.title = add(parent, "h3");
     this.box = new Box(parent, () => this.options());
-    const list = text(parent, "dl", "marks");
+    const list = add(parent, "dl", { className: "marks" });
     this.figures = [...Object.keys(PARTS), "max"].map((name) => {
-      const row = text(list, "div");
-      text(row, "dt").textContent = name;
-      return text(row, "dd");
+      const row = add(list, "div");
+      add(row, "dt", { textContent: name });
+      return /** @type {const} */ ([name, add(row, "dd")]);
     });
-    this.said = text(parent, "p", "quiet");
+    this.said = add(parent, "p", { className: "quiet" });
     /** @type {Record<string, number>} In us. */
     this.marks = {};
   }
 
+  /** @returns {import("./plot.js").Options} */
   options() {
     return {
-      padding: [24, 12, 0, 0],
+      padding: [2 * LETTERS, 12, 0, 0],
       cursor: { show: false },
       scales: {
         x: { time: false, distr: 3, range: (_, least, most) => [10 ** Math.floor(Math.log10(least ?? 10)), Math.max(most ?? 0, 1_000)] },
-        y: { range: (_, least, most) => [0, Math.max(1, most ?? 1)] },
+        y: { range: (_plot, _least, most) => [0, Math.max(1, most ?? 1)] },
       },
       axes: [
-        axis((_, times) => times.map(micros), { size: 24, splits: ({ scales: { x } }) => decades(x.min, x.max), filter: (_, times) => times }),
-        axis((_, roots) => roots.map((root) => (Number.isInteger(root) ? written(root * root) : "")), { size: 44, space: 28 }),
+        { ...axis((_, times) => times.map(micros), 24, 0), splits: ({ scales: { x } }) => decades(x.min, x.max), filter: (_, times) => times },
+        axis((_, roots) => roots.map((root) => written(root * root)), 44, 36, true),
       ],
       series: [{}, { paths: Plot.paths.stepped({ align: 1 }), width: 0, fill: () => colours.accent, points: { show: false } }],
       hooks: { draw: [(plot) => this.mark(plot)] },
@@ -75,25 +69,29 @@ export class Histogram {
     const { counts, longest } = frames;
     const { from, counts: held } = steps(counts, longest);
     const total = held.reduce((sum, count) => sum + count, 0);
-    this.marks = Object.fromEntries(Object.entries(PARTS).map(([name, part]) => [name, frames.quantile(part)]));
-    this.marks.max = longest;
+    const quantiles = Object.entries(PARTS).map(([name, part]) => [name, frames.quantile(part)]);
+    this.marks = { ...Object.fromEntries(quantiles), max: longest };
     const data = [from, held.map(Math.sqrt)];
     this.box.ready(data)?.setData(data);
     put(this.title, say("path_histogram"));
-    Object.values(this.marks).forEach((us, index) => put(this.figures[index], total ? micros(us) : "\u2013"));
+    for (const [name, element] of this.figures) put(element, total ? micros(this.marks[name] ?? 0) : "\u2013");
     put(this.said, total ? say("frames_told", total) : say("frames_none"));
   }
 
-  /** Draws a line with its name for each mark. */
+  /**
+   * Draws a line with its name for each mark.
+   *
+   * @param {import("./plot.js").Picture} plot
+   */
   mark({ ctx, bbox, valToPos }) {
     const ratio = devicePixelRatio;
     ctx.save();
-    ctx.font = `600 ${12 * ratio}px system-ui, sans-serif`;
+    ctx.font = `600 ${LETTERS * ratio}px system-ui, sans-serif`;
     ctx.textBaseline = "bottom";
     ctx.fillStyle = colours.ink;
     let free = -Infinity;
     for (const name of MARKED) {
-      const x = Math.round(valToPos(this.marks[name], "x", true));
+      const x = Math.round(valToPos(this.marks[name] ?? 0, "x", true));
       if (!(x >= bbox.left && x <= bbox.left + bbox.width + 1)) continue;
       ctx.fillRect(x, bbox.top - 4 * ratio, ratio, bbox.height + 4 * ratio);
       const width = ctx.measureText(name).width;
@@ -105,25 +103,32 @@ export class Histogram {
   }
 }
 
-/** The powers of ten in a range. */
+/**
+ * The powers of ten in a range.
+ *
+ * @param {number} least
+ * @param {number} most
+ */
 function decades(least, most) {
+  /** @type {number[]} */
   const all = [];
   for (let power = Math.ceil(Math.log10(least) - 1e-9); 10 ** power <= most * 1.001; power++) all.push(10 ** power);
   return all;
 }
 
 export class Losses {
+  /** @param {HTMLElement} parent */
   constructor(parent) {
-    this.title = text(parent, "h3");
-    this.said = text(parent, "p", "quiet");
+    this.title = add(parent, "h3");
+    this.said = add(parent, "p", { className: "quiet" });
     this.box = new Box(parent, () => ({
       ms: 1,
       padding: [8, 12, 0, 0],
       cursor: { show: false },
-      scales: { x: { time: true, range: (_, least, most) => [least - 30_000, most + 30_000] }, y: { range: (_, least, most) => [0, Math.max(4, most ?? 0)] } },
+      scales: { x: { time: true, range: (_, least, most) => [(least ?? 0) - 30_000, (most ?? 0) + 30_000] }, y: { range: (_plot, _least, most) => [0, Math.max(4, most ?? 0)] } },
       axes: [
-        axis((_, at) => at.map((time) => timeOfDay(time).slice(0, 5)), { size: 24, space: 60, grid: { show: false } }),
-        axis((_, values) => ticks(values), { size: 44, space: 20, incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1_000, 10_000, 100_000] }),
+        axis((_, at) => at.map((time) => timeOfDay(time).slice(0, 5)), 24, 60),
+        axis((_, values) => ticks(values), 44, 20, true),
       ],
       series: [{}, { paths: Plot.paths.bars({ size: [0.7] }), width: 0, fill: () => colours.accent, points: { show: false } }],
     }));

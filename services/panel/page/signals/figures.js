@@ -26,7 +26,11 @@ const HEADS = /** @type {const} */ ({
 });
 /** Their keys. */
 const KEYS = /** @type {Key[]} */ (Object.keys(HEADS));
-/** What one of them is in the unit that is shown: whole sensors, and percent. */
+/**
+ * What one of them is in the unit that is shown: whole sensors, and percent.
+ *
+ * @type {Partial<Record<Key, number>>}
+ */
 const SHOWN = { line_error: 1 / 2, left_duty: 100 / 255, right_duty: 100 / 255 };
 
 /** Figures by time, the oldest first; `null` is not known. */
@@ -58,14 +62,14 @@ export class Columns {
   put(at, figure) {
     this.at.push(at);
     for (const key of KEYS) this.of[key].push(figure(key));
-    while (at - this.at[this.second] >= 1_000) this.second += 1;
+    while (at - (this.at[this.second] ?? at) >= 1_000) this.second += 1;
     this.of.lost_in_1s.push(increase(this.of.lost, this.second, this.at.length - 1));
   }
 
   /** Leaves out what is older, now and then. */
   cut() {
-    const from = this.at.at(-1) - KEPT_MS;
-    if (!(this.at[0] < from - SPARE_MS)) return;
+    const from = (this.at.at(-1) ?? 0) - KEPT_MS;
+    if ((this.at[0] ?? from) >= from - SPARE_MS) return;
     const gone = this.at.findIndex((at) => at >= from);
     this.at.splice(0, gone);
     for (const column of Object.values(this.of)) column.splice(0, gone);
@@ -79,11 +83,13 @@ export class Columns {
    * @returns {number[]}
    */
   lostByMinute(until) {
+    /** @type {number[]} */
     const minutes = Array(KEPT_MS / 60_000).fill(0);
-    for (let row = 1; row < this.at.length; row++) {
-      const minute = minutes.length - 1 - Math.floor((until - this.at[row]) / 60_000);
-      if (minute in minutes) minutes[minute] += increase(this.of.lost, row - 1, row) ?? 0;
-    }
+    this.at.forEach((at, row) => {
+      const minute = minutes.length - 1 - Math.floor((until - at) / 60_000);
+      const sum = minutes[minute];
+      if (sum !== undefined) minutes[minute] = sum + (increase(this.of.lost, row - 1, row) ?? 0);
+    });
     return minutes;
   }
 }
@@ -96,23 +102,32 @@ export class Columns {
  * @param {number} last
  */
 function increase(counts, first, last) {
-  const [before, after] = [counts[first], counts[last]];
+  const [before = null, after = null] = [counts[first], counts[last]];
   return before === null || after === null ? null : Math.max(0, after - before);
 }
 
 /** The figures of a robot that this page shows. */
 export class Figures {
+  /** @param {import("../station/robot.js").Robot} robot */
   constructor(robot) {
     this.robot = robot;
     this.columns = new Columns();
-    /** The station's clock less this page's, in ms; null: the station has not answered yet. */
+    /**
+     * The station's clock less this page's, in ms; null: the station has not answered yet.
+     *
+     * @type {number | null}
+     */
     this.ahead = null;
     /** How many states of all that the page has heard are in the columns. */
     this.taken = 0;
     /** Whether the station is asked, and when it is asked next, by this page's clock. */
     this.isAsked = false;
     this.next = 0;
-    /** The word for why what the station has kept is not here. */
+    /**
+     * The word for why what the station has kept is not here.
+     *
+     * @type {string | null}
+     */
     this.why = null;
   }
 
@@ -136,14 +151,19 @@ export class Figures {
     if (total - this.taken > past.length) this.next = Math.min(this.next, now);
     if (now >= this.next && !this.isAsked) this.ask();
     if (this.ahead === null) return;
-    if (total > this.taken) this.hear(past.slice(-(total - this.taken)));
+    if (total > this.taken) this.hear(past.slice(-(total - this.taken)), this.ahead);
     this.columns.cut();
   }
 
-  /** Adds what the page has heard. */
-  hear(rows) {
+  /**
+   * Adds what the page has heard.
+   *
+   * @param {Row[]} rows with times by this page's clock
+   * @param {number} ahead
+   */
+  hear(rows, ahead) {
     this.taken = this.robot.total;
-    for (const row of rows) this.columns.push({ ...row, at: row.at + this.ahead });
+    for (const row of rows) this.columns.push({ ...row, at: row.at + ahead });
   }
 
   /** Fetches the last ten minutes from the station. */
@@ -153,15 +173,16 @@ export class Figures {
       const query = new URLSearchParams({ robot: this.robot.name });
       const sent = performance.now();
       const answer = await fetch(new URL(`history/states.csv?${query}`, location.href), { cache: "no-store" });
-      this.ahead = stationTime(answer.headers) - (sent + performance.now()) / 2;
+      const ahead = stationTime(answer.headers) - (sent + performance.now()) / 2;
+      this.ahead = ahead;
       this.why = answer.ok ? null : ({ 404: "no_history", 503: "history_busy" }[answer.status] ?? "lost");
       // A station without a history will have none later.
       this.next = answer.ok || answer.status === 404 ? Infinity : performance.now() + AGAIN_MS;
-      if (!answer.ok) return;
+      if (!answer.ok || !answer.body) return;
       const columns = new Columns();
       for await (const row of table(answer.body)) columns.push(row);
       this.columns = columns;
-      this.hear(this.robot.past);
+      this.hear(this.robot.past, ahead);
     } catch {
       this.why = "lost";
       this.next = performance.now() + AGAIN_MS;
@@ -171,9 +192,13 @@ export class Figures {
   }
 }
 
-/** The station's clock in an answer, in ms since 1970; every answer has at least its second. */
+/**
+ * The station's clock in an answer, in ms since 1970; every answer has at least its second.
+ *
+ * @param {Headers} headers
+ */
 function stationTime(headers) {
-  return Number(headers.get("station-time-ms") ?? Date.parse(headers.get("date")) + 500);
+  return Number(headers.get("station-time-ms") ?? Date.parse(headers.get("date") ?? "") + 500);
 }
 
 /**
@@ -183,14 +208,15 @@ function stationTime(headers) {
  * @returns {AsyncGenerator<Row>}
  */
 async function* table(body) {
-  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+  const [reader, decoder] = [body.getReader(), new TextDecoder()];
   let rest = "";
+  /** @type {((line: string) => Row) | null} */
   let read = null;
   for (;;) {
     const { value, done } = await reader.read();
     if (done) return;
-    const lines = (rest + value).split("\n");
-    rest = lines.pop();
+    const lines = (rest + decoder.decode(value, { stream: true })).split("\n");
+    rest = lines.pop() ?? "";
     for (const line of lines) {
       if (read) yield read(line);
       else read = rowsOf(line);
@@ -206,11 +232,11 @@ async function* table(body) {
  */
 export function rowsOf(heads) {
   const names = heads.split(",");
-  const places = KEYS.map((key) => [key, names.indexOf(HEADS[key])]);
+  const places = KEYS.map((key) => /** @type {const} */ ([key, names.indexOf(HEADS[key])]));
   return (line) => {
     // Texts stand in quotation marks where they have commas. No figure does.
     const cells = line.replace(/"[^"]*"/g, "").split(",");
     const figures = places.map(([key, place]) => [key, cells[place] ? Number(cells[place]) : null]);
-    return { at: Number(cells[0]) * 1_000, ...Object.fromEntries(figures) };
+    return { at: Number(cells[0]) * 1_000, .../** @type {Record<Key, number | null>} */ (Object.fromEntries(figures)) };
   };
 }

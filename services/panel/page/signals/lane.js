@@ -3,6 +3,7 @@
 import { Box, axis, colours } from "./plot.js";
 import { GAP_MS } from "./figures.js";
 import { ticks, timeOfDay, written } from "./lanes.js";
+import { add } from "./add.js";
 import { put, say } from "../words/words.js";
 
 /** The height of the time axis, which only the lowest lane has, in pixels. */
@@ -12,7 +13,11 @@ const FIGURES_PX = 48;
 /** From pixels to the next, no zoom is meant. */
 const LEAST_DRAG_PX = 4;
 
-/** The stronger line where the figures are 0. */
+/**
+ * The stronger line where the figures are 0.
+ *
+ * @param {import("./plot.js").Picture} plot
+ */
 function zero({ ctx, bbox, scales: { y }, valToPos }) {
   if (y.min > 0 || y.max < 0) return;
   const height = Math.round(valToPos(0, "y", true));
@@ -29,48 +34,51 @@ export class Lane {
   constructor(parent, lane, shared) {
     this.lane = lane;
     this.shared = shared;
-    /** @type {(number | null)[][]} */
-    this.data = [[], ...lane.curves.map(() => [])];
-    this.element = document.createElement("section");
-    this.element.className = "lane";
-    // What the strip of the same name leads to.
-    this.element.tabIndex = -1;
+    /** @type {number[]} */
+    this.times = [];
+    /**
+     * The figures of each curve at these times.
+     *
+     * @type {(number | null)[][]}
+     */
+    this.data = [];
+    // The strip of the same name leads here.
+    this.element = add(parent, "section", { className: "lane", tabIndex: -1 });
     this.element.dataset.lane = lane.word;
-    this.title = document.createElement("h3");
-    const list = document.createElement("dl");
-    this.curves = lane.curves.map(() => {
-      const [row, name, value] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
-      row.append(name, value);
-      list.append(row);
-      return { name, value };
+    const legend = add(this.element, "div");
+    this.title = add(legend, "h3");
+    const list = add(legend, "dl");
+    this.curves = lane.curves.map((curve) => {
+      const row = add(list, "div");
+      return { ...curve, name: add(row, "dt"), value: add(row, "dd") };
     });
-    const legend = document.createElement("div");
-    legend.append(this.title, list);
-    this.element.append(legend);
-    parent.append(this.element);
     this.box = new Box(this.element, () => this.options());
   }
 
-  /** What uPlot draws. */
+  /**
+   * What uPlot draws.
+   *
+   * @returns {import("./plot.js").Options}
+   */
   options() {
     const { lane, shared } = this;
-    const stroke = [() => colours.accent, () => colours.ink];
+    const stroke = (/** @type {number} */ curve) => (curve ? colours.ink : colours.accent);
     return {
       ms: 1,
       padding: [8, 12, shared.isLast ? 0 : 8, 0],
       scales: { x: { time: true }, y: { range: (_, least, most) => lane.range(least, most) } },
       axes: [
-        axis((_, at) => at.map((time) => (shared.isLast ? timeOfDay(time) : "")), { size: shared.isLast ? TIMES_PX : 0, space: 90 }),
-        axis((_, values) => ticks(values), { size: FIGURES_PX, space: 20 }),
+        axis((_, at) => at.map((time) => (shared.isLast ? timeOfDay(time) : "")), shared.isLast ? TIMES_PX : 0, 90),
+        axis((_, values) => ticks(values), FIGURES_PX, 20, !lane.decimals),
       ],
       series: [{}, ...lane.curves.map((_, index) => ({
-        stroke: stroke[index], width: 1.5, dash: index ? [4, 3] : undefined, points: { show: false },
+        stroke: () => stroke(index), width: 1.5, dash: index ? [4, 3] : undefined, points: { show: false },
       }))],
       cursor: {
         y: false,
-        sync: { key: "signals", setSeries: false, filters: { pub: (kind) => kind === "mousemove" || kind === "mouseleave" } },
+        sync: { key: "signals", setSeries: false, filters: { pub: (/** @type {string} */ kind) => kind === "mousemove" || kind === "mouseleave" } },
         drag: { setScale: false, dist: LEAST_DRAG_PX },
-        points: { size: 9, width: 2, fill: () => colours.panel, stroke: (_, index) => stroke[index - 1]() },
+        points: { size: 9, width: 2, fill: () => colours.panel, stroke: (/** @type {unknown} */ _, /** @type {number} */ series) => stroke(series - 1) },
         bind: { dblclick: () => shared.back },
       },
       hooks: {
@@ -94,10 +102,12 @@ export class Lane {
    * @param {import("./span.js").Range} range
    */
   draw({ at, of }, { from, to }) {
-    this.data = [at, ...this.lane.curves.map(({ key }) => of[key])];
-    const plot = this.box.ready(this.data);
+    this.times = at;
+    this.data = this.lane.curves.map(({ key }) => of[key]);
+    const data = [at, ...this.data];
+    const plot = this.box.ready(data);
     plot?.batch(() => {
-      plot.setData(this.data, false);
+      plot.setData(data, false);
       plot.setScale("x", { min: from, max: to });
     });
     this.tell();
@@ -106,13 +116,11 @@ export class Lane {
   /** Its name, and its figures at the cursor or the newest. */
   tell() {
     const { lane, data } = this;
-    const at = this.at();
-    const row = nearest(data[0], at);
+    const row = nearest(this.times, this.at());
     put(this.title, say(lane.title));
-    this.curves.forEach(({ name, value }, index) => {
-      const { label, word } = lane.curves[index];
-      const figure = row === null ? null : data[index + 1][row];
-      put(name, label ?? say(word));
+    this.curves.forEach(({ label, word, name, value }, index) => {
+      const figure = data[index]?.[row] ?? null;
+      put(name, label ?? say(word ?? ""));
       put(value, figure === null ? "\u2013" : `${written(figure, lane.decimals)} ${lane.unit}`.trim());
     });
   }
@@ -134,15 +142,21 @@ export class Lane {
   }
 }
 
-/** The row of a time, or the last one without a time; null if nothing was known near it. */
+/**
+ * The row of a time, or the last one without a time; -1 if nothing was known near it.
+ *
+ * @param {number[]} times
+ * @param {number | null} at
+ */
 function nearest(times, at) {
-  if (at === null) return times.length ? times.length - 1 : null;
+  if (at === null) return times.length - 1;
+  const off = (/** @type {number} */ row) => Math.abs((times[row] ?? Infinity) - at);
   let [low, high] = [0, times.length - 1];
   while (low < high) {
     const middle = (low + high) >> 1;
-    if (times[middle] < at) low = middle + 1;
+    if ((times[middle] ?? 0) < at) low = middle + 1;
     else high = middle;
   }
-  const row = low > 0 && at - times[low - 1] < times[low] - at ? low - 1 : low;
-  return Math.abs(times[row] - at) <= GAP_MS ? row : null;
+  const row = off(low - 1) < off(low) ? low - 1 : low;
+  return off(row) <= GAP_MS ? row : -1;
 }

@@ -6,7 +6,7 @@ import { current } from "../words/words.js";
  * @typedef {object} Lane
  * @property {string} word the word for what it shows; the strip at the page's foot has the same
  * @property {string} title the word that it is called by here
- * @property {{ key: string, word?: string, label?: string }[]} curves the second one is dashed
+ * @property {{ key: import("./figures.js").Key | "lost_in_1s", word?: string, label?: string }[]} curves the second one is dashed
  * @property {string} unit
  * @property {number} decimals
  * @property {(least: number | null, most: number | null) => [number, number]} range
@@ -50,6 +50,8 @@ export function written(value, decimals = 0) {
  */
 export function ticks(values) {
   const decimals = values.some((value) => value % 1 !== 0) ? 1 : 0;
+  // Room is left for five signs.
+  if (Math.max(...values) >= 10_000) return values.map((value) => (value ? `${written(value / 1_000)}k` : "0"));
   return values.map((value) => written(value, decimals));
 }
 
