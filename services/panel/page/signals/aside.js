@@ -3,7 +3,6 @@
 import { KEPT_MS } from "./figures.js";
 import { micros, ticks, timeOfDay, written } from "./lanes.js";
 import { Box, LETTERS, axis, colours } from "./plot.js";
-import { LAST, upper } from "../station/quantile.js";
 import { Plot } from "../vendor/uplot.js";
 import { add } from "./add.js";
 import { put, say } from "../words/words.js";
@@ -12,23 +11,6 @@ import { put, say } from "../words/words.js";
 const PARTS = { p50: 0.5, p99: 0.99, "p99.9": 0.999 };
 /** Of these a line stands in the picture. */
 const MARKED = ["p50", "p99", "max"];
-
-/**
- * The steps of a histogram: where each bucket begins, in us, and how many frames it holds.
- *
- * @param {number[]} counts of each bucket
- * @param {number} longest in us
- * @returns {{ from: number[], counts: number[] }}
- */
-export function steps(counts, longest) {
-  const first = Math.max(1, counts.findIndex((count) => count > 0));
-  const last = Math.max(first, counts.findLastIndex((count) => count > 0));
-  const buckets = Array.from({ length: last - first + 1 }, (_, index) => first + index);
-  const end = last === LAST ? longest : upper(last);
-  // The axis has no 0: what is faster than the first of them stands in it.
-  const held = buckets.map((bucket) => (counts[bucket] ?? 0) + (bucket === 1 ? (counts[0] ?? 0) : 0));
-  return { from: [...buckets.map((bucket) => upper(bucket - 1)), end], counts: [...held, 0] };
-}
 
 export class Histogram {
   /** @param {HTMLElement} parent */
@@ -66,12 +48,11 @@ export class Histogram {
 
   /** @param {import("../station/quantile.js").Frames} frames */
   draw(frames) {
-    const { counts, longest } = frames;
-    const { from, counts: held } = steps(counts, longest);
-    const total = held.reduce((sum, count) => sum + count, 0);
+    const { from, counts } = frames.steps();
+    const total = counts.reduce((sum, count) => sum + count, 0);
     const quantiles = Object.entries(PARTS).map(([name, part]) => [name, frames.quantile(part)]);
-    this.marks = { ...Object.fromEntries(quantiles), max: longest };
-    const data = [from, held.map(Math.sqrt)];
+    this.marks = { ...Object.fromEntries(quantiles), max: frames.longest };
+    const data = [from, counts.map(Math.sqrt)];
     this.box.ready(data)?.setData(data);
     put(this.title, say("path_histogram"));
     for (const [name, element] of this.figures) put(element, total ? micros(this.marks[name] ?? 0) : "\u2013");

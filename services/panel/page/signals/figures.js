@@ -40,7 +40,7 @@ export class Columns {
     this.at = [];
     /** @type {Record<Key | "lost_in_1s", (number | null)[]>} */
     this.of = { line_error: [], left_duty: [], right_duty: [], distance_cm: [], battery: [], path_p50: [], path_p99: [], lost: [], lost_in_1s: [] };
-    /** The first row that is less than a second older than the last one. */
+    /** The first row that is at most a second older than the last one. */
     this.second = 0;
   }
 
@@ -62,7 +62,7 @@ export class Columns {
   put(at, figure) {
     this.at.push(at);
     for (const key of KEYS) this.of[key].push(figure(key));
-    while (at - (this.at[this.second] ?? at) >= 1_000) this.second += 1;
+    while (at - (this.at[this.second] ?? at) > 1_000) this.second += 1;
     this.of.lost_in_1s.push(increase(this.of.lost, this.second, this.at.length - 1));
   }
 

@@ -1,14 +1,14 @@
 // How long the path from sensor to steering has taken, from the counts that a robot tells.
 
 /** The last bucket; it has no upper end. */
-export const LAST = 89;
+const LAST = 89;
 
 /**
  * Below which time in us a bucket's frames lie: steps of 256 ns, then four buckets for each doubling.
  *
  * @param {number} bucket
  */
-export function upper(bucket) {
+function upper(bucket) {
   if (bucket < 1) return (256 * (bucket + 1)) / 1_000;
   return ((5 + ((bucket - 1) % 4)) * 2 ** (6 + Math.floor((bucket - 1) / 4))) / 1_000;
 }
@@ -40,7 +40,8 @@ export function quantile(part, counted, longest) {
 /** The frames of many reports, by how long they took. */
 export class Frames {
   constructor() {
-    this.total = 0;
+    /** The last report. */
+    this.last = "";
     /** The longest time of all, in us. */
     this.longest = 0;
     /**
@@ -58,10 +59,13 @@ export class Frames {
    * @param {number[]} counted the number and the count of each bucket in turn
    */
   add(longest, counted) {
+    // The station tells its last report again on each connection.
+    const report = [longest, ...counted].join();
+    if (report === this.last) return;
+    this.last = report;
     for (let i = 0; i + 1 < counted.length; i += 2) {
       const [bucket = 0, count = 0] = counted.slice(i, i + 2);
       this.counts[bucket] = (this.counts[bucket] ?? 0) + count;
-      this.total += count;
     }
     if (counted.length) this.longest = Math.max(this.longest, longest);
   }
@@ -73,5 +77,19 @@ export class Frames {
    */
   quantile(part) {
     return quantile(part, this.counts.flatMap((count, bucket) => [bucket, count]), this.longest);
+  }
+
+  /**
+   * The steps of a histogram: where each bucket begins, in us, and how many it holds; the last one is empty.
+   *
+   * @returns {{ from: number[], counts: number[] }}
+   */
+  steps() {
+    const first = Math.max(1, this.counts.findIndex((count) => count > 0));
+    const last = Math.max(first, this.counts.findLastIndex((count) => count > 0));
+    const buckets = Array.from({ length: last - first + 1 }, (_, index) => first + index);
+    // A logarithmic axis has no 0: what is faster than the first of them stands in it.
+    const counts = buckets.map((bucket) => (this.counts[bucket] ?? 0) + (bucket === 1 ? (this.counts[0] ?? 0) : 0));
+    return { from: [...buckets.map((bucket) => upper(bucket - 1)), last === LAST ? this.longest : upper(last)], counts: [...counts, 0] };
   }
 }
