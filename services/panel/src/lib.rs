@@ -7,7 +7,8 @@
 //! ```
 //!
 //! - [`Panel`]: the server, in one thread with tasks of its own.
-//! - `page`: the files, embedded and packed, and `bundle`: their scripts as one.
+//! - `page`: the files, embedded and packed, and `bundle`: their scripts as one, and as another one
+//!   what a page needs later.
 //! - `stop`: STOP by a form, which needs no script and no socket.
 //! - `history`: what the station keeps of the last day, as a table or as lines.
 //! - `access`: who may open the files. `lager_door` decides how many may ask, and for how long.

@@ -21,7 +21,7 @@ export class Histogram {
     this.figures = [...Object.keys(PARTS), "max"].map((name) => {
       const row = add(list, "div");
       add(row, "dt", { textContent: name });
-      return /** @type {const} */ ([name, add(row, "dd")]);
+      return { name, element: add(row, "dd") };
     });
     this.said = add(parent, "p", { className: "quiet" });
     /** @type {Record<string, number>} In us. */
@@ -55,7 +55,7 @@ export class Histogram {
     const data = [from, counts.map(Math.sqrt)];
     this.box.ready(data)?.setData(data);
     put(this.title, say("path_histogram"));
-    for (const [name, element] of this.figures) put(element, total ? micros(this.marks[name] ?? 0) : "\u2013");
+    for (const { name, element } of this.figures) put(element, total ? micros(this.marks[name] ?? 0) : "\u2013");
     put(this.said, total ? say("frames_told", total) : say("frames_none"));
   }
 

@@ -13,19 +13,27 @@ const AGAIN_MS = 5_000;
 /** What the columns may hold above what is kept, in ms: they are cut that seldom. */
 const SPARE_MS = 30_000;
 
-/** The column of the station's table that has the figures of a key. */
-const HEADS = /** @type {const} */ ({
-  line_error: "line_error_half_sensors",
-  left_duty: "left_duty_of_255",
-  right_duty: "right_duty_of_255",
-  distance_cm: "distance_cm",
-  battery: "battery_V",
-  path_p50: "path_p50_us",
-  path_p99: "path_p99_us",
-  lost: "lost_packets",
-});
-/** Their keys. */
-const KEYS = /** @type {Key[]} */ (Object.keys(HEADS));
+/**
+ * What is kept, and the column of the station's table that has it.
+ *
+ * @type {[Key, string][]}
+ */
+const HEADS = [
+  ["line_error", "line_error_half_sensors"],
+  ["left_duty", "left_duty_of_255"],
+  ["right_duty", "right_duty_of_255"],
+  ["distance_cm", "distance_cm"],
+  ["battery", "battery_V"],
+  ["path_p50", "path_p50_us"],
+  ["path_p99", "path_p99_us"],
+  ["lost", "lost_packets"],
+];
+/**
+ * Nothing of it.
+ *
+ * @type {Record<Key, number | null>}
+ */
+const NOTHING = { line_error: null, left_duty: null, right_duty: null, distance_cm: null, battery: null, path_p50: null, path_p99: null, lost: null };
 /**
  * What one of them is in the unit that is shown: whole sensors, and percent.
  *
@@ -61,7 +69,7 @@ export class Columns {
    */
   put(at, figure) {
     this.at.push(at);
-    for (const key of KEYS) this.of[key].push(figure(key));
+    for (const [key] of HEADS) this.of[key].push(figure(key));
     while (at - (this.at[this.second] ?? at) > 1_000) this.second += 1;
     this.of.lost_in_1s.push(increase(this.of.lost, this.second, this.at.length - 1));
   }
@@ -232,11 +240,12 @@ async function* table(body) {
  */
 export function rowsOf(heads) {
   const names = heads.split(",");
-  const places = KEYS.map((key) => /** @type {const} */ ([key, names.indexOf(HEADS[key])]));
+  const places = HEADS.map(([key, head]) => ({ key, place: names.indexOf(head) }));
   return (line) => {
     // Texts stand in quotation marks where they have commas. No figure does.
     const cells = line.replace(/"[^"]*"/g, "").split(",");
-    const figures = places.map(([key, place]) => [key, cells[place] ? Number(cells[place]) : null]);
-    return { at: Number(cells[0]) * 1_000, .../** @type {Record<Key, number | null>} */ (Object.fromEntries(figures)) };
+    const row = { ...NOTHING, at: Number(cells[0]) * 1_000 };
+    for (const { key, place } of places) row[key] = cells[place] ? Number(cells[place]) : null;
+    return row;
   };
 }

@@ -62,7 +62,8 @@ export class Lane {
    */
   options() {
     const { lane, shared } = this;
-    const stroke = (/** @type {number} */ curve) => (curve ? colours.ink : colours.accent);
+    /** @param {number} curve */
+    const stroke = (curve) => (curve ? colours.ink : colours.accent);
     return {
       ms: 1,
       padding: [8, 12, shared.isLast ? 0 : 8, 0],
@@ -76,9 +77,9 @@ export class Lane {
       }))],
       cursor: {
         y: false,
-        sync: { key: "signals", setSeries: false, filters: { pub: (/** @type {string} */ kind) => kind === "mousemove" || kind === "mouseleave" } },
+        sync: { key: "signals", setSeries: false, filters: { pub: (kind) => kind === "mousemove" || kind === "mouseleave" } },
         drag: { setScale: false, dist: LEAST_DRAG_PX },
-        points: { size: 9, width: 2, fill: () => colours.panel, stroke: (/** @type {unknown} */ _, /** @type {number} */ series) => stroke(series - 1) },
+        points: { size: 9, width: 2, fill: () => colours.panel, stroke: (_, series) => stroke(series - 1) },
         bind: { dblclick: () => shared.back },
       },
       hooks: {
@@ -150,7 +151,8 @@ export class Lane {
  */
 function nearest(times, at) {
   if (at === null) return times.length - 1;
-  const off = (/** @type {number} */ row) => Math.abs((times[row] ?? Infinity) - at);
+  /** @param {number} row */
+  const off = (row) => Math.abs((times[row] ?? Infinity) - at);
   let [low, high] = [0, times.length - 1];
   while (low < high) {
     const middle = (low + high) >> 1;

@@ -35,12 +35,21 @@ import { Plot } from "../vendor/uplot.js";
  * @property {{ x: { time: boolean, distr?: 3, range?: Range }, y: { range: Range } }} scales
  * @property {Axis[]} axes
  * @property {Curve[]} series
- * @property {object} cursor
+ * @property {Cursor} cursor
  * @property {{ draw?: Hook[], drawAxes?: Hook[], setCursor?: Hook[], setSelect?: Hook[] }} [hooks]
  */
 /** @typedef {{ values: Written, splits?: (plot: Picture) => number[], filter?: (plot: Picture, values: number[]) => number[] } & Record<string, any>} Axis */
 /** @typedef {{ stroke?: () => string, fill?: () => string, width?: number, dash?: number[] | undefined, paths?: unknown, points?: object }} Curve */
 /** @typedef {(plot: Picture) => void} Hook */
+/**
+ * @typedef {object} Cursor
+ * @property {boolean} [show]
+ * @property {boolean} [y]
+ * @property {{ key: string, setSeries: boolean, filters: { pub: (kind: string) => boolean } }} [sync]
+ * @property {{ setScale: boolean, dist: number }} [drag]
+ * @property {{ size: number, width: number, fill: () => string, stroke: (plot: Picture, series: number) => string }} [points]
+ * @property {{ dblclick: () => () => void }} [bind]
+ */
 /** @typedef {{ ink: string, quiet: string, accent: string, edge: string, panel: string }} Colours */
 
 /**

@@ -3,7 +3,7 @@
 import { KEPT_MS } from "./figures.js";
 
 /** The whiles to choose from, in ms. */
-export const WINDOWS_MS = /** @type {const} */ ([30_000, 60_000, 120_000, KEPT_MS]);
+export const WINDOWS_MS = [30_000, 60_000, 120_000, KEPT_MS];
 /** The shortest time that is shown, in ms: ten states of the robot. */
 const LEAST_MS = 500;
 
@@ -11,8 +11,7 @@ const LEAST_MS = 500;
 
 export class Span {
   constructor() {
-    /** @type {number} */
-    this.ms = WINDOWS_MS[1];
+    this.ms = 60_000;
     /**
      * The held time; null: the last while is shown, and moves on.
      *
