@@ -146,7 +146,10 @@ pub(crate) fn what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_ha
     page.click("#signals-again");
     page.wait_for("#signals-state", "could not be fetched");
     block(page, json!([]));
-    page.click_until("#signals-again", "document.querySelectorAll('.lane').length === 6");
+    page.click_until(
+        "#signals-again",
+        "document.querySelectorAll('.lane').length === 6",
+    );
     page.wait_until("document.querySelector('#signals-state').hidden");
 
     page.wait_until(

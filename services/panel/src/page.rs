@@ -164,7 +164,7 @@ mod tests {
         for (name, content) in scripts() {
             for line in content.lines().filter(|line| line.starts_with("import")) {
                 let is_one = line.starts_with("import { ") && line.ends_with(".js\";");
-                assert!(is_one, "{name}: {line}");
+                assert!(is_one && !line.contains(" as "), "{name}: {line}");
             }
             for line in content.lines().filter(|line| line.starts_with("export")) {
                 let rest = line
@@ -190,7 +190,7 @@ mod tests {
     fn the_library_of_plots_is_sent_as_it_was_written_and_only_to_who_wants_it() {
         let library = written("vendor/uplot.js").unwrap();
         let (head, _) = library.split_once("\nexport ").unwrap();
-        assert!(head.starts_with("/*!") && head.contains("MIT License"));
+        assert!(head.contains("/*!") && head.contains("MIT License"));
         assert!(file("/signals/signals.js", "").unwrap().1.contains(head));
         assert!(!file("/main.js", "").unwrap().1.contains("uPlot"));
     }

@@ -2,7 +2,7 @@
 
 import { add } from "./add.js";
 import { WINDOWS_MS } from "./span.js";
-import { put, say, span as inWords } from "../words/words.js";
+import { put, say, span } from "../words/words.js";
 
 /**
  * A time as short as it is clear.
@@ -10,7 +10,7 @@ import { put, say, span as inWords } from "../words/words.js";
  * @param {number} ms
  */
 function brief(ms) {
-  return ms < 60_000 ? `${Math.round(ms / 1_000)} s` : inWords(ms);
+  return ms < 60_000 ? `${Math.round(ms / 1_000)} s` : span(ms);
 }
 
 /**
@@ -45,7 +45,7 @@ export class Tools {
   }
 
   /**
-   * @param {import("./span.js").Span} span
+   * @param {import("./span.js").Span} shown
    * @param {number} now by the station's clock
    */
   draw({ held, ms, older }, now) {
