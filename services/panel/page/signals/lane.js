@@ -78,6 +78,8 @@ export class Lane {
       cursor: {
         y: false,
         sync: { key: "signals", setSeries: false, filters: { pub: (kind) => kind === "mousemove" || kind === "mouseleave" } },
+        // In a gap no curve is marked.
+        dataIdx: (_plot, _series, row, at) => (Math.abs((this.times[row] ?? Infinity) - at) <= GAP_MS ? row : null),
         drag: { setScale: false, dist: LEAST_DRAG_PX },
         points: { size: 9, width: 2, fill: () => colours.panel, stroke: (_, series) => stroke(series - 1) },
         bind: { dblclick: () => shared.back },

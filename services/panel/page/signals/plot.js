@@ -46,6 +46,7 @@ import { Plot } from "../vendor/uplot.js";
  * @property {boolean} [show]
  * @property {boolean} [y]
  * @property {{ key: string, setSeries: boolean, filters: { pub: (kind: string) => boolean } }} [sync]
+ * @property {(plot: Picture, series: number, row: number, at: number) => number | null} [dataIdx]
  * @property {{ setScale: boolean, dist: number }} [drag]
  * @property {{ size: number, width: number, fill: () => string, stroke: (plot: Picture, series: number) => string }} [points]
  * @property {{ dblclick: () => () => void }} [bind]
