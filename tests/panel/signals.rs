@@ -136,7 +136,7 @@ pub(crate) fn what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_ha
     );
     // Its script does not come: the page says so, and tries again when somebody wants it to.
     page.call("Network.enable", &json!({}));
-    let block = |page: &mut Page, urls| {
+    let block = |page: &mut Page, urls: serde_json::Value| {
         page.call("Network.setBlockedURLs", &json!({ "urls": urls }));
     };
     block(page, json!(["*/signals/signals.js*"]));
