@@ -13,6 +13,7 @@ mod reasons;
 mod releases;
 mod scene;
 mod setting_up;
+mod signals;
 mod stopping;
 mod traps;
 
@@ -88,6 +89,8 @@ each_alone! {
     driving::in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants,
     driving::after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile,
     traps::what_is_pressed_while_the_panel_is_silent_is_refused_and_never_done,
+    signals::the_view_of_signals_shows_the_station_s_last_minutes_and_holds_still,
+    signals::what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_has_all_frames,
     releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
 }
 

@@ -11,6 +11,7 @@ import { Driving } from "./drive/drive.js";
 import { Fleet } from "./fleet/fleet.js";
 import { ByHand } from "./drive/hand.js";
 import { Line } from "./line/line.js";
+import { Later } from "./signals/later.js";
 import { Link } from "./station/link.js";
 import { Log } from "./log/log.js";
 import { WarehouseMap } from "./map/map.js";
@@ -74,7 +75,15 @@ const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, 
   at("robot").value = name;
   at("robot").dispatchEvent(new Event("change"));
 });
-const strips = new Strips(at("strips"));
+const signals = new Later(
+  { view: at("signals"), said: at("signals-state"), again: at("signals-again") },
+  () => at("armed").checked,
+  (query) => (query ? import(`./signals/signals.js${query}`) : import("./signals/signals.js")),
+);
+const strips = new Strips(at("strips"), (lane) => {
+  show(at("tab-signals"));
+  signals.show(lane);
+});
 const notify = new Notify(link, at("notify"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
 
@@ -220,6 +229,7 @@ function drawRest(shown, time) {
   arm.draw(shown);
   driving.draw();
   strips.draw(shown);
+  signals.draw(shown, time);
   line.draw(shown);
   asked.draw(shown);
   byHand.draw(shown);

@@ -7,9 +7,10 @@
 //!   GET /history/moment?robot=r1&at=<ms>                         likewise, the last of each report
 //! ```
 //!
-//! Times are in ms since 1970. Without `until` a time ends now, and without `since` it begins ten
-//! minutes before its end. `<line>` is a line of the station's extension, `thought <text>` or
-//! `asked <name> <what>`, as in [`speech`](crate::speech).
+//! Times are in ms since 1970; the header `station-time-ms` of an answer says which is now. Without
+//! `until` a time ends now, and without `since` it begins ten minutes before its end. `<line>` is a
+//! line of the station's extension, `thought <text>` or `asked <name> <what>`, as in
+//! [`speech`](crate::speech).
 //!
 //! A thread of its own reads the files for each answer, and at most [`MOST`] answers are under way.
 //! It reads on only as fast as the browser takes it in, and gives up when the browser takes in nothing
@@ -22,7 +23,7 @@ use std::ops::{ControlFlow, RangeInclusive};
 use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderName, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use futures_util::stream::unfold;
 use lager_lines::Name;
@@ -43,6 +44,9 @@ const LOOK: Duration = Duration::from_millis(5);
 const PIECE: usize = 32 * 1024;
 /// The time before the end that is meant when nobody says since when, in ms.
 const USUAL_MS: u64 = 600_000;
+
+/// The station's clock in an answer, in ms since 1970: a browser's may be wrong.
+pub(crate) const STATION_TIME: HeaderName = HeaderName::from_static("station-time-ms");
 
 /// What somebody wants to know.
 #[derive(Clone, Debug, PartialEq, Eq)]

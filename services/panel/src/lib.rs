@@ -7,7 +7,8 @@
 //! ```
 //!
 //! - [`Panel`]: the server, in one thread with tasks of its own.
-//! - `page`: the files, embedded and packed, and `bundle`: their scripts as one.
+//! - `page`: the files, embedded and packed, and `bundle`: their scripts as one, and as another one
+//!   what a page needs later.
 //! - `stop`: STOP by a form, which needs no script and no socket.
 //! - `history`: what the station keeps of the last day, as a table or as lines.
 //! - `access`: who may open the files. `lager_door` decides how many may ask, and for how long.
@@ -334,7 +335,8 @@ async fn past(
     }
     visitor.admit();
     let query = query.unwrap_or_default();
-    let wanted = match history::Wanted::read(&what, &query, History::now_ms()) {
+    let now_ms = History::now_ms();
+    let wanted = match history::Wanted::read(&what, &query, now_ms) {
         Ok(wanted) => wanted,
         Err(why) => return refuse(StatusCode::BAD_REQUEST, Reason::new(Code::Misread, &[&why])),
     };
@@ -346,7 +348,10 @@ async fn past(
     };
     // The number of answers and the time of each are limited.
     visitor.let_stay();
-    guarded(history::answer(history, wanted, permit))
+    let mut response = history::answer(history, wanted, permit);
+    let now = (history::STATION_TIME, now_ms.into());
+    response.headers_mut().extend([now]);
+    guarded(response)
 }
 
 /// Whether the panel's own page asks: by its origin, or by what the browser says of it.

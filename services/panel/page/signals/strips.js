@@ -1,12 +1,21 @@
 // The last minute as strips of a few figures, and the eleven line sensors as a bar.
 //
 // A strip moves with every picture of the screen. It is not drawn anew for that: what is there is
-// shifted by the pixels that time has passed, and what is new is drawn at its end.
+// shifted by the pixels that time has passed, and what is new is drawn at its end. The library of plots that
+// the view of signals has would draw each strip anew for every picture, and would have to be loaded before the
+// page's first view.
 
 import { SPAN_MS } from "../station/robot.js";
 import { decimal, put, say } from "../words/words.js";
 
-/** Word, unit, least and most value, keys of the past. */
+/** @typedef {import("../station/robot.js").Robot} Robot */
+/** @typedef {import("../station/robot.js").Moment} Moment */
+
+/**
+ * Word, unit, least and most value, keys of the past.
+ *
+ * @type {[string, string, number, number | null, (keyof Moment)[]][]}
+ */
 const STRIPS = [
   ["line_error", "", -10, 10, ["line_error"]],
   ["duty", "%", 0, 255, ["left_duty", "right_duty"]],
@@ -21,6 +30,9 @@ const DARK = matchMedia("(prefers-color-scheme: dark)");
 /**
  * What each line sensor sees, the leftmost first, 1 for tape; null if the board is not heard. Where it
  * tells only how far the line is off, the sensor above the middle of the tape does.
+ *
+ * @param {import("../station/robot.js").State} [state]
+ * @returns {string | null}
  */
 export function sensors({ line_bits: bits, line_error: error } = {}) {
   if (bits || error === undefined) return bits ?? null;
@@ -29,8 +41,15 @@ export function sensors({ line_bits: bits, line_error: error } = {}) {
 }
 
 export class Strips {
-  constructor(parent) {
-    this.strips = STRIPS.map((strip) => new Strip(parent, ...strip));
+  /**
+   * @param {HTMLElement} parent
+   * @param {(word: string) => void} open shows the lane of a strip that somebody has clicked
+   */
+  constructor(parent, open) {
+    /** @type {boolean | null} */
+    this.dark = null;
+    this.colours = ["", ""];
+    this.strips = STRIPS.map((strip) => new Strip(parent, open, ...strip));
     const [figure, row] = [document.createElement("figure"), document.createElement("div")];
     figure.id = "sensors";
     this.caption = document.createElement("figcaption");
@@ -39,12 +58,21 @@ export class Strips {
     parent.append(figure);
   }
 
-  /** Moves the lines: for every picture of the screen. */
+  /**
+   * Moves the lines: for every picture of the screen.
+   *
+   * @param {Robot | null} robot
+   * @param {number} now
+   */
   move(robot, now) {
     for (const strip of this.strips) strip.move(robot, now);
   }
 
-  /** Figures and sensors. */
+  /**
+   * Figures and sensors.
+   *
+   * @param {Robot | null} robot
+   */
   draw(robot) {
     const dark = DARK.matches;
     if (this.dark !== dark) {
@@ -60,7 +88,12 @@ export class Strips {
   }
 }
 
-/** Figures with their unit, short enough for a caption. */
+/**
+ * Figures with their unit, short enough for a caption.
+ *
+ * @param {number[]} figures
+ * @param {string} unit
+ */
 function told(figures, unit) {
   if (unit === "µs" && Math.max(...figures) >= 1000) return `${figures.map((us) => decimal(us / 1000)).join(" / ")} ms`;
   // A duty is told in parts of 255.
@@ -70,31 +103,60 @@ function told(figures, unit) {
 }
 
 class Strip {
-  constructor(parent, word, unit, low, high, keys) {
-    Object.assign(this, { word, unit, low, high, keys });
-    const figure = document.createElement("figure");
-    this.caption = document.createElement("figcaption");
+  /**
+   * @param {HTMLElement} parent
+   * @param {(word: string) => void} open
+   * @param {string} word
+   * @param {string} unit
+   * @param {number} low
+   * @param {number | null} high
+   * @param {(keyof Moment)[]} keys
+   */
+  constructor(parent, open, word, unit, low, high, keys) {
+    this.word = word;
+    this.unit = unit;
+    this.low = low;
+    this.high = high;
+    this.top = high ?? 1;
+    this.keys = keys;
+    const [figure, caption] = [document.createElement("figure"), document.createElement("figcaption")];
+    this.caption = document.createElement("button");
+    this.caption.type = "button";
+    this.caption.dataset.lane = word;
+    this.caption.onclick = () => open(word);
+    caption.append(this.caption);
     this.canvas = document.createElement("canvas");
-    figure.append(this.caption, this.canvas);
+    figure.append(caption, this.canvas);
     parent.append(figure);
     this.pen = this.canvas.getContext("2d");
+    this.box = { width: 0, height: 0 };
+    this.size = { width: 0, height: 0, ratio: 1 };
     // To ask for the size would lay the page out each time.
-    new ResizeObserver(([{ contentRect }]) => (this.box = contentRect)).observe(this.canvas);
+    new ResizeObserver(([seen]) => (this.box = seen?.contentRect ?? this.box)).observe(this.canvas);
     this.colours = ["", ""];
-    /** What the canvas shows: whose past, drawn in what way, up to which point and which column. */
+    this.look = "";
+    /**
+     * What the canvas shows: whose past, drawn in what way, up to which point and which column.
+     *
+     * @type {{ robot: Robot | null, look: string, total: number, column: number }}
+     */
     this.shown = { robot: null, look: "", total: 0, column: 0 };
   }
 
-  /** The last figures, and what the lines look like. */
+  /**
+   * The last figures, and what the lines look like.
+   *
+   * @param {Robot | null} robot
+   * @param {string[]} colours
+   */
   draw(robot, colours) {
     const last = robot?.past.at(-1);
-    const values = this.keys.map((key) => last?.[key]);
-    const known = values.filter((value) => value !== null && value !== undefined);
+    const known = this.keys.flatMap((key) => last?.[key] ?? []);
     const text = `${say(this.word)} ${known.length ? told(known, this.unit) : "–"}`;
     if (this.caption.textContent !== text) this.caption.textContent = text;
 
     const ratio = devicePixelRatio;
-    const [width, height] = [this.box?.width ?? 0, this.box?.height ?? 0].map((side) => Math.round(side * ratio));
+    const [width, height] = [Math.round(this.box.width * ratio), Math.round(this.box.height * ratio)];
     const since = performance.now() - SPAN_MS;
     const seen = (robot?.past ?? []).filter(({ at }) => at > since);
     this.top = this.high ?? Math.max(1, ...seen.flatMap((point) => this.keys.map((key) => point[key] ?? 0)));
@@ -103,9 +165,13 @@ class Strip {
     this.size = { width, height, ratio };
   }
 
+  /**
+   * @param {Robot | null} robot
+   * @param {number} now
+   */
   move(robot, now) {
-    if (!this.size?.width || !this.size.height) return;
-    const { width } = this.size;
+    const { pen, size: { width, height } } = this;
+    if (!pen || !width || !height) return;
     const past = robot?.past ?? [];
     const total = robot?.total ?? 0;
     // Columns are counted from when the page was opened, so that a shift is of whole pixels.
@@ -115,27 +181,33 @@ class Strip {
     if (shown.robot === robot && shown.look === this.look && shift === 0 && total === shown.total) return;
     let first = past.length - (total - shown.total) - 1;
     if (shown.robot !== robot || shown.look !== this.look || shift >= width) {
-      Object.assign(this.canvas, { width, height: this.size.height });
+      Object.assign(this.canvas, { width, height });
       first = past.findIndex(({ at }) => this.column(at) > column - width);
       if (first < 0) first = past.length;
     } else if (shift > 0) {
-      this.pen.globalCompositeOperation = "copy";
-      this.pen.drawImage(this.canvas, -shift, 0);
-      this.pen.globalCompositeOperation = "source-over";
+      pen.globalCompositeOperation = "copy";
+      pen.drawImage(this.canvas, -shift, 0);
+      pen.globalCompositeOperation = "source-over";
     }
-    this.line(past.slice(Math.max(0, first)), column);
+    this.line(pen, past.slice(Math.max(0, first)), column);
     this.shown = { robot, look: this.look, total, column };
   }
 
-  /** Draws from the first of these points to the last. */
-  line(points, column) {
+  /**
+   * Draws from the first of these points to the last.
+   *
+   * @param {CanvasRenderingContext2D} pen
+   * @param {Moment[]} points
+   * @param {number} column
+   */
+  line(pen, points, column) {
     if (points.length < 2) return;
-    const { pen, low, top } = this;
+    const { low, top } = this;
     const { width, height, ratio } = this.size;
     pen.lineWidth = 1.5 * ratio;
     pen.lineCap = "round";
     this.keys.forEach((key, index) => {
-      pen.strokeStyle = this.colours[index];
+      pen.strokeStyle = this.colours[index] ?? "";
       pen.beginPath();
       let isDrawn = false;
       for (const { at, [key]: value } of points) {
@@ -151,7 +223,11 @@ class Strip {
     });
   }
 
-  /** The column of pixels of a moment. */
+  /**
+   * The column of pixels of a moment.
+   *
+   * @param {number} at
+   */
   column(at) {
     return Math.floor((at * this.size.width) / SPAN_MS);
   }

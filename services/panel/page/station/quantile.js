@@ -36,3 +36,60 @@ export function quantile(part, counted, longest) {
   }
   return longest;
 }
+
+/** The frames of many reports, by how long they took. */
+export class Frames {
+  constructor() {
+    /** The last report. */
+    this.last = "";
+    /** The longest time of all, in us. */
+    this.longest = 0;
+    /**
+     * How many each bucket holds.
+     *
+     * @type {number[]}
+     */
+    this.counts = Array(LAST + 1).fill(0);
+  }
+
+  /**
+   * Adds a report.
+   *
+   * @param {number} longest in us
+   * @param {number[]} counted the number and the count of each bucket in turn
+   */
+  add(longest, counted) {
+    // The station tells its last report again on each connection.
+    const report = [longest, ...counted].join();
+    if (report === this.last) return;
+    this.last = report;
+    for (let i = 0; i + 1 < counted.length; i += 2) {
+      const [bucket = 0, count = 0] = counted.slice(i, i + 2);
+      this.counts[bucket] = (this.counts[bucket] ?? 0) + count;
+    }
+    if (counted.length) this.longest = Math.max(this.longest, longest);
+  }
+
+  /**
+   * The time that a part of them did not exceed, in us.
+   *
+   * @param {number} part from 0 to 1
+   */
+  quantile(part) {
+    return quantile(part, this.counts.flatMap((count, bucket) => [bucket, count]), this.longest);
+  }
+
+  /**
+   * The steps of a histogram: where each bucket begins, in us, and how many it holds; the last one is empty.
+   *
+   * @returns {{ from: number[], counts: number[] }}
+   */
+  steps() {
+    const first = Math.max(1, this.counts.findIndex((count) => count > 0));
+    const last = Math.max(first, this.counts.findLastIndex((count) => count > 0));
+    const buckets = Array.from({ length: last - first + 1 }, (_, index) => first + index);
+    // A logarithmic axis has no 0: what is faster than the first of them stands in it.
+    const counts = buckets.map((bucket) => (this.counts[bucket] ?? 0) + (bucket === 1 ? (this.counts[0] ?? 0) : 0));
+    return { from: [...buckets.map((bucket) => upper(bucket - 1)), last === LAST ? this.longest : upper(last)], counts: [...counts, 0] };
+  }
+}

@@ -51,6 +51,7 @@ const NOW = {
   },
   latency(robot, words) {
     const [longest = 0, ...counted] = words.map(Number);
+    robot.frames.add(longest, counted);
     // Without a frame measured there is no new figure.
     if (counted.length > 0) robot.latency = { p50: quantile(0.5, counted, longest), p99: quantile(0.99, counted, longest) };
   },

@@ -1,5 +1,7 @@
 // What is known of one robot. Views draw this, and change none of it.
 
+import { Frames } from "./quantile.js";
+
 /** @typedef {"left" | "up" | "right" | "down"} Side */
 /** @typedef {{ x: number, y: number, heading: number }} Pose In mm with y upwards, and degrees to the right from up. */
 /** @typedef {{ id: number, name?: string, square: [number, number], side: Side }} Product */
@@ -77,6 +79,8 @@ export class Robot {
     this.truth = null;
     /** @type {{ p50: number, p99: number } | null} */
     this.latency = null;
+    /** How long frames have taken since the page was opened. */
+    this.frames = new Frames();
     /**
      * What each line sensor has read in the last calibration, the leftmost first.
      *

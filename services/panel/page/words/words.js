@@ -60,6 +60,10 @@ const WORDS = {
     legend_route: "its route; the ring is the next crossing", legend_trail: "where it has driven", legend_goods: "goods", legend_ordered: "goods that are ordered, with their turn",
     legend_gone: "goods that are not in their place", map_how: "Arrows choose goods, crossings and ways; the tip says what Enter does there. With Shift the arrows move the map, plus and minus zoom.",
     reload: "Load the page anew",
+    plots_loading: "The plots are being fetched.", plots_failed: "The plots could not be fetched. Look whether the station can be reached, then try again.", plots_again: "Try again",
+    pause: "Pause", go_live: "Go live", paused: "paused, {0} behind", time_window: "time that is shown", zoom_back: "Zoom back", lanes_how: "signals; left and right move the cursor", newest: "Newest", at_cursor: "At the cursor",
+    history_fetched: "The last ten minutes are being fetched.", unit_sensors: "sensors", unit_lost: "in 1 s", lane_duty: "duty", lane_distance: "distance ahead", lane_path: "path latency", lane_lost: "lost packets",
+    path_histogram: "Path latency, sensor to decision", frames_told: "{0} frames since this page was opened; heights are square roots", frames_none: "No frame has been measured yet.", lost_by_minute: "Packets lost each minute", lost_in_all: "{0} in ten minutes",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -117,6 +121,10 @@ const WORDS = {
     legend_trail: "där den har kört", legend_goods: "vara", legend_ordered: "beställd vara, med sin tur", legend_gone: "vara som inte är på sin plats",
     map_how: "Pilarna väljer varor, korsningar och vägar; rutan säger vad Enter gör där. Med Skift flyttar pilarna kartan, plus och minus zoomar.",
     reload: "Ladda om sidan",
+    plots_loading: "Diagrammen hämtas.", plots_failed: "Diagrammen kunde inte hämtas. Se efter om stationen kan nås och försök sedan igen.", plots_again: "Försök igen",
+    pause: "Pausa", go_live: "Visa nuet", paused: "pausad, {0} efter", time_window: "tid som visas", zoom_back: "Zooma tillbaka", lanes_how: "signaler; vänster och höger flyttar markören", newest: "Nyast", at_cursor: "Vid markören",
+    history_fetched: "De senaste tio minuterna hämtas.", unit_sensors: "sensorer", unit_lost: "på 1 s", lane_duty: "pådrag", lane_distance: "avstånd framåt", lane_path: "fördröjning", lane_lost: "förlorade paket",
+    path_histogram: "Fördröjning från sensor till beslut", frames_told: "{0} mätningar sedan sidan öppnades; höjderna är kvadratrötter", frames_none: "Inget har mätts än.", lost_by_minute: "Förlorade paket varje minut", lost_in_all: "{0} på tio minuter",
   },
 };
 
