@@ -11,12 +11,16 @@ import { Line } from "./line/line.js";
 import { Link } from "./station/link.js";
 import { Log } from "./log/log.js";
 import { WarehouseMap } from "./map/map.js";
+import { Kept } from "./time/kept.js";
 import { Missions } from "./missions/missions.js";
+import { Moment } from "./time/moment.js";
 import { Notify } from "./bar/notify.js";
 import { offers } from "./map/offers.js";
 import { called, reason } from "./words/sentences.js";
+import { Save } from "./log/save.js";
 import { Setup } from "./setup/setup.js";
 import { Strips } from "./signals/strips.js";
+import { TimeLine } from "./time/line.js";
 import { change, current, put, say, translate } from "./words/words.js";
 
 const at = (id) => document.getElementById(id);
@@ -26,6 +30,8 @@ current();
 translate();
 const link = new Link();
 const robot = () => shown(link);
+const kept = new Kept(link);
+const moment = new Moment(link, robot, () => at("armed").checked);
 
 const bar = new Bar(link, {
   link: at("link"), mode: at("mode"), driver: at("driver"), battery: at("battery"), told: at("told"),
@@ -41,7 +47,7 @@ const map = new WarehouseMap(at("map"), {
   hand: {
     tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: () => !at("setup").hidden,
     offers: offers({
-      link, robot, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
+      link, now, obstacle: meetWay, isPast: () => moment.isPast, robot: () => moment.shown(robot(), now())[0], isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
       fetch: (product) => missions.fetch(product, { beside: at("map-undo"), said: at("map-said") }),
       goods: (square, side) => setup.place(square, side),
     }),
@@ -70,7 +76,11 @@ const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, 
 });
 const strips = new Strips(at("strips"));
 const notify = new Notify(link, at("notify"));
-const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
+const log = new Log({ panel: at("log"), map: at("map-zone"), filter: at("filter"), kinds: at("log-kinds"), entries: at("entries"), earlier: at("log-earlier"), said: at("log-said") }, { kept, moment, robot });
+const save = new Save(link, { span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
+const timeLine = new TimeLine(link, {
+  line: at("time"), slider: at("time-line"), choice: at("time-span"), from: at("time-from"), before: at("time-before"), after: at("time-after"), now: at("time-now"), tag: at("moment"),
+}, { kept, moment, robot });
 
 /** Puts an obstacle on a way of a simulated world, or takes it away. */
 async function meetWay(edge) {
@@ -158,6 +168,8 @@ function show(tab) {
     at(other.getAttribute("aria-controls")).hidden = !chosen;
   }
   driving.letGo();
+  // Who drives sees what is now.
+  if (tab.id === "tab-drive") moment.back();
 }
 
 /** Words that change with the language or with who looks. */
@@ -220,28 +232,34 @@ function picture() {
   const isSmooth = pause < 34;
   const shown = robot();
   driving.pads();
-  map.move(shown, time);
+  const [seen, then] = moment.shown(shown, time);
+  map.move(seen, then);
   const isRest = time - drawn >= REST_MS;
-  if (isSmooth || isRest) strips.move(shown, time);
+  if (isSmooth || isRest) strips.move(seen, then);
   if (isRest) {
     drawn = time;
-    drawRest(shown, time);
+    drawRest(shown, time, seen, then);
   }
 }
 
-function drawRest(shown, time) {
+/** Draws the robot in view, and on map and strips what is `seen` of it at the time `then`: the same, or a past moment. */
+function drawRest(shown, time, seen, then) {
   const face = bar.draw(shown, time);
-  map.draw(shown, [...link.robots.values()].filter((other) => other !== shown), time, face);
+  const isNow = seen === shown;
+  const others = isNow ? [...link.robots.values()].filter((other) => other !== shown) : shown ? [asNow(shown)] : [];
+  map.draw(seen, others, then, isNow ? face : seen ? moment.face() : null);
   drawRemedy(face);
   fleet.draw(shown, time);
   missions.draw(shown, time);
   arm.draw(shown);
   driving.draw();
-  strips.draw(shown);
+  strips.draw(seen, then);
+  timeLine.draw(shown);
   line.draw(shown);
   asked.draw(shown);
   byHand.draw(shown);
   log.draw(shown);
+  save.draw(shown);
   notify.draw(time);
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", called(shown.driver)] : ["control_free"];
@@ -251,6 +269,10 @@ function drawRest(shown, time) {
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
+
+/** The live robot beside the past one: grey, and called what it is. */
+const asNow = (live) => Object.create(live, { name: { value: say("time_now") }, isStale: { value: () => true } });
+
 /** The control of this page that ends what is wrong, by the name of the remedy. */
 const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup" };
 

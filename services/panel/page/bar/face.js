@@ -92,7 +92,7 @@ function does({ state: { phase, next, product, hold, stopped: isStopped } }) {
 /** A latched stop: since when, by whom or why, and that the wheels stand. */
 function stopped(link, robot, more) {
   const { left_duty: left, right_duty: right, stood_ms: ms } = robot.state;
-  const since = robot.stoppedSince === null ? null : sentence("face_ago", { age: age(Date.now() - robot.stoppedSince) });
+  const since = robot.stoppedSince === null ? null : sentence("face_ago", { age: age(link.now() - robot.stoppedSince) });
   const by = stopper(link, robot);
   const turns = Number(left) || Number(right) ? "turn" : ms === undefined ? "stand" : "stood";
   const proof = left === undefined ? null : sentence(`face_wheels_${turns}`, { ms });

@@ -110,7 +110,8 @@ export class WarehouseMap {
     if (robot?.truth) this.ghost.move(robot.truth);
     if (!shown) return;
     const { unsure } = robot.pose;
-    const pose = this.glide(this.floor.onWayOut(robot.pose), now, stale);
+    const pose = this.glide(this.floor.onWayOut(robot.pose), now, stale, this.of !== robot);
+    this.of = robot;
     this.body.move(pose);
     this.labels.follow("chip", [pose.x, -pose.y]);
     // Where the axle may be: as wide as odometry is wrong until the next mark, and as it was driven by hand since.
@@ -124,6 +125,7 @@ export class WarehouseMap {
   /** Draws what changes now and then: ways, goods, the robots' states and what is said of them. */
   draw(robot, others, now, state) {
     this.state = state;
+    this.svg.dataset.look = state?.look ?? "none";
     put(this.words, this.describe(robot));
     if (robot) {
       this.ways.drawThings(robot, this.side, this.px);
@@ -230,11 +232,11 @@ export class WarehouseMap {
     ].filter(Boolean).join(" ");
   }
 
-  /** Where to draw between two poses. */
-  glide(aim, now, stale) {
+  /** Where to draw between two poses; another robot, or the same at another time, is where it is at once. */
+  glide(aim, now, stale, isOther) {
     const still = REDUCED.matches;
     const shown = this.shown;
-    const jump = !shown || still || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500;
+    const jump = !shown || still || isOther || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500;
     const part = jump ? 1 : Math.min(1, (now - shown.at) / GLIDE_MS);
     // From -180 to 180, however often it has turned round.
     const turn = jump ? 0 : ((((aim.heading - shown.heading + 180) % 360) + 360) % 360) - 180;
@@ -244,7 +246,7 @@ export class WarehouseMap {
       heading: jump ? aim.heading : shown.heading + turn * part,
     };
     if (!stale || jump) this.shown = { ...pose, at: now };
-    return stale && shown ? shown : pose;
+    return stale && !jump ? shown : pose;
   }
 
   /** All of the floor, above the map's words and buttons. */

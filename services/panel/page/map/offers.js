@@ -8,9 +8,10 @@ import { clock, say } from "../words/words.js";
 
 /**
  * `link` and `robot` as everywhere. `fetch` orders goods or asks whether they are back, `stands` says where the robot
- * stands, `obstacle` puts or takes one, `goods` puts goods at the side of a square; `isPlaceWanted` and `now` as named.
+ * stands, `obstacle` puts or takes one, `goods` puts goods at the side of a square; `isPlaceWanted` and `now` as named. While the map shows
+ * the past (`isPast`), nothing on it is ordered: `robot` is the past one then.
  */
-export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now }) {
+export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now, isPast }) {
   const of = {
     /** Goods are fetched; those that are not in their place, after a question. */
     good({ id }) {
@@ -64,5 +65,8 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
   }
 
   /** What it is, what a click does, or why a click does nothing. */
-  return (target) => (target ? of[target.kind](target) : { why: say("nothing_here") });
+  return (target) => {
+    const offer = target ? of[target.kind](target) : { why: say("nothing_here") };
+    return isPast() ? { what: offer.what, why: say("past_orders") } : offer;
+  };
 }

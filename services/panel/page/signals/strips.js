@@ -44,8 +44,8 @@ export class Strips {
     for (const strip of this.strips) strip.move(robot, now);
   }
 
-  /** Figures and sensors. */
-  draw(robot) {
+  /** Figures and sensors of a robot at a time. */
+  draw(robot, now) {
     const dark = DARK.matches;
     if (this.dark !== dark) {
       this.dark = dark;
@@ -53,7 +53,7 @@ export class Strips {
       this.colours = [style.getPropertyValue("--accent"), style.getPropertyValue("--quiet")];
     }
     const { colours } = this;
-    for (const strip of this.strips) strip.draw(robot, colours);
+    for (const strip of this.strips) strip.draw(robot, now, colours);
     put(this.caption, say("line_sensors"));
     const seen = sensors(robot?.state);
     this.sensors.forEach((bar, index) => bar.classList.toggle("on", seen?.[index] === "1"));
@@ -86,7 +86,7 @@ class Strip {
   }
 
   /** The last figures, and what the lines look like. */
-  draw(robot, colours) {
+  draw(robot, now, colours) {
     const last = robot?.past.at(-1);
     const values = this.keys.map((key) => last?.[key]);
     const known = values.filter((value) => value !== null && value !== undefined);
@@ -95,7 +95,7 @@ class Strip {
 
     const ratio = devicePixelRatio;
     const [width, height] = [this.box?.width ?? 0, this.box?.height ?? 0].map((side) => Math.round(side * ratio));
-    const since = performance.now() - SPAN_MS;
+    const since = now - SPAN_MS;
     const seen = (robot?.past ?? []).filter(({ at }) => at > since);
     this.top = this.high ?? Math.max(1, ...seen.flatMap((point) => this.keys.map((key) => point[key] ?? 0)));
     this.colours = colours;

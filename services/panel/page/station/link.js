@@ -3,10 +3,11 @@
 // What the station says, one or more lines in a message (services/panel/src/speech.rs):
 //
 //   you <name> driver|viewer
+//   time <ms>                         the station's clock, in ms since 1970; first, and once a second
 //   warehouse <json>
 //   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
-//   from <robot> asked <who> <what>   a person here wants an action, stop, take or free
+//   from <robot> asked <who> <what>   a person here wants an action, stop, take, ask, keep, free or warehouse
 //   past <robot> <ms> <an event, a thought or what was asked so long ago>
 //   answer <number> done [<reason>{; <reason>}] | refused <reason> | stopped <ms> | lost <reason>
 //
@@ -33,10 +34,12 @@ export const SPAN_MS = 60_000;
 const HERE_MS = 1_000;
 /** Said where the panel no longer knows the browser: `up` was started anew, or the cookie is gone. */
 const NO_TOKEN = "no_token";
+/** A clock that goes back by more than this was set, in ms. */
+const SET_MS = 1_000;
 const RETRY_MS = [250, 500, 1_000, 2_000];
 
 /** What is known of one robot. */
-class Robot {
+export class Robot {
   constructor(name) {
     this.name = name;
     this.connected = false;
@@ -114,8 +117,23 @@ export class Link extends EventTarget {
     this.number = 0;
     this.waiting = new Map();
     this.tries = 0;
+    /** How far the station's clock is ahead of this page's, in ms; the browser's own may be wrong. */
+    this.ahead = Date.now() - performance.now();
+    this.isTimed = false;
     this.connect();
     setInterval(() => this.open && this.send("here", clock()), HERE_MS);
+  }
+
+  /** This moment by the station's clock, in ms since 1970. */
+  now() {
+    return performance.now() + this.ahead;
+  }
+
+  /** The station has told its time. The way here takes some, so the most that it is ahead counts, unless it was set. */
+  setTime(ms) {
+    const ahead = ms - performance.now();
+    if (!this.isTimed || ahead > this.ahead || ahead < this.ahead - SET_MS) this.ahead = ahead;
+    this.isTimed = true;
   }
 
   connect() {
@@ -184,7 +202,7 @@ export class Link extends EventTarget {
     // A command that is given again and again is refused as often.
     const last = asked?.events.at(-1);
     const isSame = last?.kind === "refused" && last.words[0] === refused;
-    if (asked && !isSame) asked.happened({ at: Date.now(), kind: "refused", words: [refused], values: null });
+    if (asked && !isSame) asked.happened({ at: this.now(), kind: "refused", words: [refused], values: null });
     return answer;
   }
 
@@ -211,6 +229,8 @@ export class Link extends EventTarget {
       this.about(this.robot(rest[0]), fields(rest.slice(1)));
     } else if (word === "answer") {
       this.answer(rest);
+    } else if (word === "time") {
+      this.setTime(Number(rest[0]));
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
@@ -253,10 +273,18 @@ export class Link extends EventTarget {
   }
 
   report(robot, word, rest, age = 0) {
-    const now = performance.now();
+    const entry = Link.take(robot, word, rest, performance.now(), this.now() - age);
+    if (entry) this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
+  }
+
+  /**
+   * Keeps what a line tells of a robot; the entry of the log, if the line is one. `now` is when it came by this page's
+   * clock, and `at` when it was so in ms since 1970: of a past robot, both are of then.
+   */
+  static take(robot, word, rest, now, at) {
     if (word === "state") {
       const state = fields(rest);
-      robot.stoppedSince = state.stop_age_ms === undefined ? null : Date.now() - Number(state.stop_age_ms);
+      robot.stoppedSince = state.stop_age_ms === undefined ? null : at - Number(state.stop_age_ms);
       stray(robot, state, now);
       robot.state = state;
       robot.stated = now;
@@ -291,9 +319,9 @@ export class Link extends EventTarget {
         return { reading, lowest, highest, both: both === 1 };
       });
     } else {
-      const entry = note(robot, word, rest, Date.now() - age);
-      if (entry) this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
+      return note(robot, word, rest, at);
     }
+    return null;
   }
 
   emit(name) {

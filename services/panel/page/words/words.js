@@ -58,6 +58,11 @@ const WORDS = {
     delivered_here: "Delivery", flag_next: "next {0}", flag_blocked: "blocked {0} s", legend: "Legend", legend_robot: "the robot", legend_unsure: "where it may be",
     legend_route: "its route; the ring is the next crossing", legend_trail: "where it has driven", legend_goods: "goods", legend_ordered: "goods that are ordered, with their turn",
     legend_gone: "goods that are not in their place", map_how: "Arrows choose goods, crossings and ways; the tip says what Enter does there. With Shift the arrows move the map, plus and minus zoom.",
+    time_line: "time line", time_span: "how long the time line is", time_now: "Now", time_before: "what happened before (K)", time_after: "what happened after (J)",
+    moment: "the moment {0}", moment_ago: "the moment {0}, {1} ago", moment_none: "The station has kept nothing of this moment.", past_orders: "this is the past: press “Now”, then click",
+    log_all: "All", log_stop: "stop", log_help: "help", log_goods: "goods", log_ways: "way", log_persons: "person", log_link: "link", log_battery: "battery", log_settings: "settings",
+    log_kinds: "which kinds are shown", log_earlier: "Earlier", log_no_earlier: "The station has kept nothing from before that.",
+    did_ask: "{0} asks for the wheel", did_keep: "{0} keeps the wheel", did_warehouse: "{0} describes the warehouse anew",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -114,6 +119,11 @@ const WORDS = {
     flag_blocked: "spärrad {0} s", legend: "Teckenförklaring", legend_robot: "roboten", legend_unsure: "där den kan vara", legend_route: "dess väg; ringen är nästa korsning",
     legend_trail: "där den har kört", legend_goods: "vara", legend_ordered: "beställd vara, med sin tur", legend_gone: "vara som inte är på sin plats",
     map_how: "Pilarna väljer varor, korsningar och vägar; rutan säger vad Enter gör där. Med Skift flyttar pilarna kartan, plus och minus zoomar.",
+    time_line: "tidslinje", time_span: "hur lång tidslinjen är", time_now: "Nu", time_before: "det som hände före (K)", time_after: "det som hände efter (J)",
+    moment: "ögonblicket {0}", moment_ago: "ögonblicket {0}, för {1} sedan", moment_none: "Stationen har inte sparat något av det ögonblicket.", past_orders: "detta är det förflutna: tryck på ”Nu”, klicka sedan",
+    log_all: "Allt", log_stop: "stopp", log_help: "hjälp", log_goods: "varor", log_ways: "väg", log_persons: "person", log_link: "länk", log_battery: "batteri", log_settings: "inställning",
+    log_kinds: "vilka slag som visas", log_earlier: "Tidigare", log_no_earlier: "Stationen har inte sparat något från tiden före det.",
+    did_ask: "{0} ber om ratten", did_keep: "{0} behåller ratten", did_warehouse: "{0} beskriver lagret på nytt",
   },
 };
 
@@ -151,9 +161,9 @@ export function decimal(value) {
   return current() === "sv" ? text.replace(".", ",") : text;
 }
 
-/** The time of day of a moment in ms since 1970. */
+/** The time of day of a moment in ms since 1970, in the browser's zone: `09:41:33` in both languages. */
 export function clock(at) {
-  return new Date(at).toLocaleTimeString(current());
+  return new Date(at).toLocaleTimeString(current(), { hourCycle: "h23", hour: "2-digit", minute: "2-digit", second: "2-digit" });
 }
 
 /** A time in ms, in words. */
