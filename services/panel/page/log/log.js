@@ -18,6 +18,9 @@ export class Log {
     this.kinds = new Set();
     this.rows = new WeakMap();
     this.most = ROWS;
+    /** The entry whose row was chosen last. */
+    this.chosen = null;
+    this.choices = 0;
     this.chips = new Map();
     for (const kind of ["", ...Object.keys(KINDS)]) this.chip(kind);
     parts.earlier.onclick = () => this.earlier();
@@ -45,7 +48,7 @@ export class Log {
     // Nobody reads it while another view is open.
     if (panel.hidden) return;
     const all = this.kept.all(robot);
-    const shown = [robot?.name, all.length, all[0]?.at, all.at(-1)?.at, filter.value, [...this.kinds], this.most, current(), this.moment.at].join();
+    const shown = [robot?.name, all.length, all[0]?.at, all.at(-1)?.at, filter.value, [...this.kinds], this.most, current(), this.moment.at, this.choices].join();
     earlier.disabled = !robot || this.kept.isFetching;
     if (this.shown === shown) return;
     this.shown = shown;
@@ -60,9 +63,9 @@ export class Log {
     this.hasMore = wanted.length > this.most;
     earlier.hidden = !this.hasMore && this.kept.isAll;
     this.fill(wanted.slice(-this.most).reverse().map((entry) => this.row(entry)));
-    // The last one that had happened by then.
+    // The one that was chosen, of several at once, or else the last one that had happened by then.
     const at = this.moment.at;
-    const now = at === null ? null : wanted.findLast((entry) => entry.at <= at);
+    const now = at === null ? null : wanted.find((entry) => entry === this.chosen && entry.at === at) ?? wanted.findLast((entry) => entry.at <= at);
     for (const row of this.shownRows) {
       row.button.classList.toggle("later", at !== null && row.at > at);
       if (row.entry === now) row.button.setAttribute("aria-current", "true");
@@ -109,6 +112,8 @@ export class Log {
     when.dateTime = new Date(entry.at).toISOString();
     button.append(when, icon(kind), cell(word, "b"), " ", cell(sentence, "span"), " ", cell(place, "small"));
     button.onclick = () => {
+      this.chosen = entry;
+      this.choices += 1;
       this.moment.go(entry.at);
       // In the hand the map may be out of sight.
       this.parts.map.scrollIntoView({ block: "nearest" });

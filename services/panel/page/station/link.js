@@ -124,9 +124,9 @@ export class Link extends EventTarget {
     setInterval(() => this.open && this.send("here", clock()), HERE_MS);
   }
 
-  /** This moment by the station's clock, in ms since 1970. */
+  /** This moment by the station's clock, in whole ms since 1970. */
   now() {
-    return performance.now() + this.ahead;
+    return Math.round(performance.now() + this.ahead);
   }
 
   /** The station has told its time. The way here takes some, so the most that it is ahead counts, unless it was set. */

@@ -29,7 +29,11 @@ export function joined(older, newer) {
   return [...older.filter((one) => one.at < from + SAME_MS && !near.some((other) => isSame(one, other))), ...newer].sort((a, b) => a.at - b.at);
 }
 
-/** Entries of the log from lines of the station's history. */
+/**
+ * Entries of the log from lines of the station's history.
+ *
+ * @param {{ at_ms: number, line: string }[]} told
+ */
 export function entries(told) {
   const past = { thinks: null, events: [], happened: (entry) => past.events.push(entry) };
   for (const { at_ms: at, line } of told) {
@@ -50,7 +54,11 @@ export class Kept {
     Object.assign(this, { name, fetched: [], marked: null, isAll: false, isFetching: false, list: null, held: null });
   }
 
-  /** Everything that is known to have happened to a robot, the oldest first; the same list until it changes. */
+  /**
+   * Everything that is known to have happened to a robot, the oldest first; the same list until it changes.
+   *
+   * @param {import("../station/link.js").Robot | null} robot
+   */
   all(robot) {
     const name = robot?.name ?? null;
     if (name !== this.name) this.of(name);
@@ -64,7 +72,12 @@ export class Kept {
     return this.list;
   }
 
-  /** Fetches what happened before all that is known; the word for why not, else null. */
+  /**
+   * Fetches what happened before all that is known.
+   *
+   * @param {import("../station/link.js").Robot} robot
+   * @returns {Promise<string | null>} the word for why not
+   */
   async earlier(robot) {
     if (this.isFetching) return null;
     this.isFetching = true;
@@ -84,7 +97,12 @@ export class Kept {
     }
   }
 
-  /** Fetches what has a mark on the time line; false if the station keeps no history. */
+  /**
+   * Fetches what has a mark on the time line.
+   *
+   * @param {import("../station/link.js").Robot} robot
+   * @returns {Promise<boolean>} false if the station keeps no history
+   */
   async marks(robot) {
     const { name } = robot;
     this.all(robot);

@@ -22,6 +22,8 @@ const MARKS = {
   help: (x) => `M${x} 4.5l5.5 9h-11z`,
   stop: (x) => `M${x - 2} 4h4l3 3v4l-3 3h-4l-3-3v-4z`,
 };
+/** The line's ends are so far inside, in pixels, so that no mark is cut. */
+const INSET = 7;
 /** Two events within this time are one step, in ms. */
 const STEP_MS = 20;
 
@@ -44,6 +46,8 @@ export class TimeLine {
     this.marks = Object.fromEntries(Object.keys(MARKS).map((kind) => [kind, make("path", { class: `mark-${kind}` }, this.svg)]));
     this.handle = make("rect", { class: "handle", y: 14, width: 6, height: 16, rx: 2 }, this.svg);
     this.width = 0;
+    /** Whether the station keeps a history, as far as is known. */
+    this.isKept = true;
     new ResizeObserver(([{ contentRect }]) => (this.width = Math.round(contentRect.width))).observe(slider);
     slider.addEventListener("keydown", (event) => this.key(event));
     slider.addEventListener("pointerdown", (event) => {
@@ -71,8 +75,8 @@ export class TimeLine {
   drag({ clientX }) {
     const { left, width } = this.parts.slider.getBoundingClientRect();
     const x = Math.max(0, Math.min(width, clientX - left));
-    if (x > width - NOW_PX) this.moment.back();
-    else this.moment.go(this.link.now() - ((width - x) / width) * this.span);
+    if (x > width - INSET - NOW_PX) this.moment.back();
+    else this.moment.go(this.link.now() - Math.min(1, (width - INSET - x) / (width - 2 * INSET)) * this.span);
     this.draw(this.robot());
   }
 
@@ -102,8 +106,9 @@ export class TimeLine {
     const { line, from, choice } = this.parts;
     if (robot && this.asked !== robot.name && this.link.open) {
       this.asked = robot.name;
-      this.kept.marks(robot).then((isKept) => (line.hidden = !isKept));
+      this.kept.marks(robot).then((isKept) => (this.isKept = isKept));
     }
+    line.hidden = !robot || !this.isKept;
     document.body.classList.toggle("past", this.moment.isShown);
     this.tag();
     if (line.hidden || !this.width) return;
@@ -119,8 +124,9 @@ export class TimeLine {
     if (this.shown === shown) return;
     this.shown = shown;
     set(this.svg, "width", width);
-    this.drawMarks(all, (then) => width * (1 - (now - then) / span));
-    const x = at === null ? width - 3 : Math.max(3, Math.min(width - 3, width * (1 - (now - at) / span)));
+    const place = (then) => INSET + (width - 2 * INSET) * (1 - (now - then) / span);
+    this.drawMarks(all, place);
+    const x = Math.max(INSET, Math.min(width - INSET, place(at ?? now)));
     set(this.handle, "x", (x - 3).toFixed(1));
     this.tell(at, now);
   }
@@ -132,12 +138,12 @@ export class TimeLine {
     const first = all[0]?.at ?? Infinity;
     for (const entry of [...(this.kept.marked ?? []).filter(({ at }) => at < first), ...all]) {
       const x = Math.round(place(entry.at));
-      if (x < 0 || x > this.width) continue;
+      if (x < INSET || x > this.width - INSET) continue;
       ticks.add(x);
       const mark = markOf(entry);
       if (mark && !paths[mark].includes(MARKS[mark](x))) paths[mark] += MARKS[mark](x);
     }
-    set(this.ticks, "d", `M0 ${BASE}H${this.width}${[...ticks].map((x) => `M${x}.5 ${BASE - 4}v8`).join("")}`);
+    set(this.ticks, "d", `M${INSET} ${BASE}H${this.width - INSET}${[...ticks].map((x) => `M${x}.5 ${BASE - 4}v8`).join("")}`);
     for (const [kind, path] of Object.entries(paths)) set(this.marks[kind], "d", path);
   }
 

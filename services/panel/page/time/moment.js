@@ -42,14 +42,22 @@ export function robotOf(live, told, at, ahead) {
 }
 
 export class Moment {
-  /** `live` is the robot in view, `isArmed` whether somebody drives it by hand from this page. */
+  /**
+   * @param {Link} link
+   * @param {() => Robot | null} live the robot in view
+   * @param {() => boolean} isArmed whether somebody drives it by hand from this page
+   */
   constructor(link, live, isArmed) {
     Object.assign(this, { link, live, isArmed });
-    /** The moment that is wanted, in ms since 1970; null is now. */
+    /**
+     * The moment that is wanted, in ms since 1970; null is now.
+     *
+     * @type {number | null}
+     */
     this.at = null;
-    /** The past robot, the moment that it is of, and the word for why there is none. */
+    /** The past robot, the time that it is of by this page's clock, and the word for why there is none. */
     this.past = null;
-    this.pastAt = null;
+    this.then = null;
     this.why = null;
     this.isLoading = false;
     this.isNew = false;
@@ -68,7 +76,11 @@ export class Moment {
     return this.at !== null && Boolean(this.past || this.why);
   }
 
-  /** Shows a moment; one that is not over yet is now. */
+  /**
+   * Shows a moment; one that is not over yet is now.
+   *
+   * @param {number} at in ms since 1970
+   */
   go(at) {
     if (this.isArmed() || at >= this.link.now()) return this.back();
     if (at === this.at) return;
@@ -80,11 +92,17 @@ export class Moment {
   /** Shows what is now. */
   back() {
     if (this.at === null) return;
-    this.at = this.past = this.pastAt = this.why = null;
+    this.at = this.past = this.why = null;
     keep(null);
   }
 
-  /** The robot to be drawn, and the time by this page's clock for which it is drawn. */
+  /**
+   * The robot to be drawn, and the time by this page's clock for which it is drawn.
+   *
+   * @param {Robot | null} live
+   * @param {number} now
+   * @returns {[Robot | null, number]}
+   */
   shown(live, now) {
     if (this.at === null) return [live, now];
     if (this.isArmed()) {
@@ -96,14 +114,14 @@ export class Moment {
       this.isNew = true;
       this.load();
     }
-    if (this.past) return [this.past, this.pastAt - this.link.ahead];
+    if (this.past) return [this.past, this.then];
     return this.why ? [null, now] : [live, now];
   }
 
   /** The look of the past robot's state, in the words of the bar. */
   face() {
-    const then = { open: true, me: this.link.me, now: () => this.pastAt };
-    return face(then, this.past, this.pastAt - this.link.ahead);
+    const link = { open: true, me: this.link.me, now: () => this.then + this.link.ahead };
+    return face(link, this.past, this.then);
   }
 
   /** Asks for what is wanted, one answer at a time; of several wishes meanwhile only the last one counts. */
@@ -140,8 +158,10 @@ export class Moment {
 
   show(live, told, at) {
     if (this.at === null) return;
-    this.past = robotOf(live, told, at, this.link.ahead);
-    this.pastAt = at;
+    // The clock may be set while this is shown.
+    const { ahead } = this.link;
+    this.past = robotOf(live, told, at, ahead);
+    this.then = at - ahead;
   }
 }
 
