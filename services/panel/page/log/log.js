@@ -59,7 +59,7 @@ export class Log {
       chip.setAttribute("aria-pressed", kind ? this.kinds.has(kind) : !this.kinds.size);
     }
     const words = filter.value.toLowerCase();
-    const wanted = all.filter((entry) => (!this.kinds.size || this.kinds.has(kindOf(entry))) && this.row(entry).words.includes(words));
+    const wanted = all.filter((entry) => (!this.kinds.size || this.kinds.has(kindOf(entry))) && (!words || this.row(entry).words.includes(words)));
     this.hasMore = wanted.length > this.most;
     earlier.hidden = !this.hasMore && this.kept.isAll;
     this.fill(wanted.slice(-this.most).reverse().map((entry) => this.row(entry)));
