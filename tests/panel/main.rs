@@ -14,7 +14,6 @@ mod releases;
 mod scene;
 mod setting_up;
 mod stopping;
-mod time;
 
 use lager_orders::Sentence;
 use lager_sample::Coded;
@@ -87,7 +86,6 @@ each_alone! {
     driving::a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it,
     driving::in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants,
     driving::after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile,
-    time::a_past_moment_is_marked_orders_nothing_and_is_the_same_on_another_page,
     releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
 }
 
