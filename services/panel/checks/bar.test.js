@@ -6,7 +6,7 @@ import { SHAPES, age, causeOf, face } from "../page/bar/face.js";
 import { Robot } from "../page/station/robot.js";
 
 const NOW = 100_000;
-const LINK = { open: true, me: "panel-1", tries: 1, closed: null };
+const LINK = { open: true, me: "panel-1", tries: 1, closed: null, now: () => Date.now() };
 
 /** A robot that is heard now and has this state. */
 const robot = (state = {}, more = {}) => Object.assign(new Robot("r1"), { connected: true, speaks: true, heard: NOW, stated: NOW, state: { x_mm: "0", phase: "waiting_for_order", mode: "autonomous", ...state } }, more);
@@ -19,7 +19,7 @@ const look = (one, link = LINK) => {
 };
 
 test("a page that is not connected yet says so", () => {
-  const shown = look(null, { open: false, me: null, tries: 0, closed: null });
+  const shown = look(null, { open: false, me: null, tries: 0, closed: null, now: () => Date.now() });
   assert.equal(shown.look, "none");
   assert.ok(shown.said);
 });

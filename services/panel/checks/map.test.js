@@ -124,7 +124,7 @@ function offered(one, more = {}) {
   const done = [];
   const act = (name) => (...what) => done.push([name, ...what]);
   const page = {
-    link: { warehouse: WAREHOUSE, mayDrive: true }, robot: () => one, now: () => NOW, isPlaceWanted: () => false,
+    link: { warehouse: WAREHOUSE, mayDrive: true }, robot: () => one, now: () => NOW, isPast: () => false, isPlaceWanted: () => false,
     fetch: act("fetch"), stands: act("stands"), obstacle: act("obstacle"), goods: act("goods"), ...more,
   };
   return { offer: offers(page), done };
@@ -157,7 +157,7 @@ test("goods that were delivered are only asked about", () => {
 test("a crossing is offered only while somebody is to say where the robot stands", () => {
   const crossing = { kind: "crossing", id: "2,1", at: [0, 0] };
   assert.equal(offered(robot({})).offer(crossing).act, undefined);
-  const { offer, done } = offered(robot({}), { isPlaceWanted: () => true });
+  const { offer, done } = offered(robot({}), { isPast: () => false, isPlaceWanted: () => true });
   offer(crossing).act();
   assert.deepEqual(done, [["stands", ["2", "1"]]]);
 });

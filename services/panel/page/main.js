@@ -15,13 +15,17 @@ import { Later } from "./signals/later.js";
 import { Link } from "./station/link.js";
 import { Log } from "./log/log.js";
 import { WarehouseMap } from "./map/map.js";
+import { Kept } from "./time/kept.js";
 import { Missions } from "./missions/missions.js";
+import { Moment } from "./time/moment.js";
 import { Notify } from "./bar/notify.js";
 import { obstacles } from "./map/obstacle.js";
 import { offers } from "./map/offers.js";
 import { drawRemedy } from "./bar/remedy.js";
+import { Save } from "./log/save.js";
 import { Setup } from "./setup/setup.js";
 import { Strips } from "./signals/strips.js";
+import { TimeLine } from "./time/line.js";
 import { Wheel } from "./drive/wheel.js";
 import { change, current, put, say, translate } from "./words/words.js";
 
@@ -31,6 +35,8 @@ current();
 translate();
 const link = new Link();
 const robot = () => shown(link);
+const kept = new Kept(link);
+const moment = new Moment(link, robot, () => at("armed").checked);
 
 const bar = new Bar(link, {
   link: at("link"), mode: at("mode"), driver: at("driver"), battery: at("battery"), told: at("told"),
@@ -47,7 +53,7 @@ const map = new WarehouseMap(at("map"), {
   hand: {
     tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: () => !at("setup").hidden,
     offers: offers({
-      link, robot, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
+      link, now, obstacle: meetWay, isPast: () => moment.isPast, robot: () => moment.shown(robot(), now())[0], isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
       fetch: (product) => missions.fetch(product, { beside: at("map-undo"), said: at("map-said") }),
       goods: (square, side) => setup.place(square, side),
     }),
@@ -85,7 +91,11 @@ const strips = new Strips(at("strips"), (lane) => {
   signals.show(lane);
 });
 const notify = new Notify(link, at("notify"));
-const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
+const log = new Log({ panel: at("log"), map: at("map-zone"), filter: at("filter"), kinds: at("log-kinds"), entries: at("entries"), earlier: at("log-earlier"), said: at("log-said") }, { kept, moment, robot });
+const save = new Save(link, { span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
+const timeLine = new TimeLine(link, {
+  line: at("time"), slider: at("time-line"), choice: at("time-span"), from: at("time-from"), before: at("time-before"), after: at("time-after"), now: at("time-now"), tag: at("moment"),
+}, { kept, moment, robot });
 
 /**
  * Has the robot in view do something, and tells where one drives why not.
@@ -143,6 +153,8 @@ function show(tab) {
     document.getElementById(other.getAttribute("aria-controls") ?? "")?.toggleAttribute("hidden", !chosen);
   }
   driving.letGo();
+  // Who drives sees what is now.
+  if (tab.id === "tab-drive") moment.back();
 }
 
 /** Words that change with the language or with who looks. */
@@ -207,37 +219,55 @@ function picture() {
   const isSmooth = pause < 34;
   const shown = robot();
   driving.pads();
-  map.move(shown, time);
+  const [seen, then] = moment.shown(shown, time);
+  map.move(seen, then);
   const isRest = time - drawn >= REST_MS;
-  if (isSmooth || isRest) strips.move(shown, time);
+  if (isSmooth || isRest) strips.move(seen, then);
   if (isRest) {
     drawn = time;
-    drawRest(shown, time);
+    drawRest(shown, time, seen, then);
   }
 }
 
 /**
+ * Draws the robot in view, and on map and strips what is `seen` of it at the time `then`: the same, or a past moment.
+ *
  * @param {Robot | null} shown
  * @param {number} time
+ * @param {Robot | null} seen
+ * @param {number} then
  */
-function drawRest(shown, time) {
+function drawRest(shown, time, seen, then) {
   const face = bar.draw(shown, time);
-  map.draw(shown, [...link.robots.values()].filter((other) => other !== shown), time, face);
+  const isNow = seen === shown;
+  const others = isNow ? [...link.robots.values()].filter((other) => other !== shown) : shown ? [asNow(shown)] : [];
+  map.draw(seen, others, then, isNow ? face : seen ? moment.face() : null);
   drawRemedy(face);
   fleet.draw(shown, time);
   missions.draw(shown, time);
   arm.draw(shown);
   driving.draw();
-  strips.draw(shown);
+  strips.draw(seen, then);
+  timeLine.draw(shown);
   signals.draw(shown, time);
   line.draw(shown);
   asked.draw(shown);
   byHand.draw(shown);
   log.draw(shown);
+  save.draw(shown);
   notify.draw(time);
   wheel.draw(shown);
   if (!link.warehouse) put(at("map-said"), say("no_map"));
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
+
+/**
+ * The live robot beside the past one: grey, and called what it is.
+ *
+ * @param {Robot} live
+ * @returns {Robot}
+ */
+const asNow = (live) => Object.create(live, { name: { value: say("time_now") }, isStale: { value: () => true } });
+
 link.addEventListener("pose", soon);
 soon();

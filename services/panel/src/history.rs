@@ -4,13 +4,15 @@
 //!   GET /history/states.csv?robot=r1[&since=<ms>][&until=<ms>]   a table; the heads have the units
 //!   GET /history/states?robot=r1[&since=<ms>][&until=<ms>]       the same, an object in each line
 //!   GET /history/events?robot=r1[&since=<ms>][&until=<ms>]       {"at_ms": <ms>, "line": <line>}
+//!     [&most=<number>][&only=<event>,<event>]
+//!   GET /history/lines?robot=r1[&since=<ms>][&until=<ms>]        likewise, its states and latencies
 //!   GET /history/moment?robot=r1&at=<ms>                         likewise, the last of each report
 //! ```
 //!
-//! Times are in ms since 1970; the header `station-time-ms` of an answer says which is now. Without
-//! `until` a time ends now, and without `since` it begins ten minutes before its end. `<line>` is a
-//! line of the station's extension, `thought <text>` or `asked <name> <what>`, as in
-//! [`speech`](crate::speech).
+//! Times are in ms since 1970. Without `until` a time ends now, and without `since` it begins ten
+//! minutes before its end. `<line>` is a line of the station's extension, `thought <text>` or
+//! `asked <name> <what>`, as in [`speech`](crate::speech). With `most` only the newest events are
+//! told, and with `only` those of these kinds; `lines` tells at most one state in [`APART_MS`].
 //!
 //! A thread of its own reads the files for each answer, and at most [`MOST`] answers are under way.
 //! It reads on only as fast as the browser takes it in, and gives up when the browser takes in nothing
@@ -27,7 +29,7 @@ use axum::http::{HeaderName, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use futures_util::stream::unfold;
 use lager_lines::Name;
-use lager_lines::extension::{Latency, Report};
+use lager_lines::extension::{Happened, Latency, Report};
 use lager_station::{Entry, History};
 use lager_topics::Durations;
 use serde_json::{Map, Value, json};
@@ -47,6 +49,9 @@ const USUAL_MS: u64 = 600_000;
 
 /// The station's clock in an answer, in ms since 1970: a browser's may be wrong.
 pub(crate) const STATION_TIME: HeaderName = HeaderName::from_static("station-time-ms");
+/// `lines` leaves out a state that came sooner than this after the one before it, in ms: a curve of
+/// a minute that is as wide as a hand needs no more.
+const APART_MS: u64 = 400;
 
 /// What somebody wants to know.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,6 +64,15 @@ pub(crate) enum Wanted {
     },
     /// What happened in a time.
     Events {
+        robot: Name,
+        span: RangeInclusive<u64>,
+        /// The newest ones, at most so many.
+        most: usize,
+        /// Events of these kinds; empty: all that happened.
+        only: Vec<String>,
+    },
+    /// What map and curves show of a time.
+    Lines {
         robot: Name,
         span: RangeInclusive<u64>,
     },
@@ -75,24 +89,23 @@ impl Wanted {
         let mut words = BTreeMap::new();
         for word in query.split('&').filter(|word| !word.is_empty()) {
             let (key, value) = word.split_once('=').unwrap_or((word, ""));
-            if !["robot", "since", "until", "at"].contains(&key) {
+            if !["robot", "since", "until", "at", "most", "only"].contains(&key) {
                 return Err(format!(
-                    "{key} stands in the address; robot, since, until and at may stand there"
+                    "{key} stands in the address; robot, since, until, at, most and only may stand there"
                 ));
             }
             words.insert(key, value);
         }
         let robot = words.get("robot").copied().unwrap_or_default();
         let robot = Name::new(robot).map_err(|error| format!("robot={robot}: {error}"))?;
-        let time = |key| match words.get(key) {
+        let number = |key, wanted| match words.get(key) {
             None => Ok(None),
             Some(text) => match text.parse::<u64>() {
-                Ok(ms) => Ok(Some(ms)),
-                Err(_) => Err(format!(
-                    "{key}={text}: a time in ms since 1970 belongs here"
-                )),
+                Ok(number) => Ok(Some(number)),
+                Err(_) => Err(format!("{key}={text}: {wanted} belongs here")),
             },
         };
+        let time = |key| number(key, "a time in ms since 1970");
         let until = time("until")?.unwrap_or(now_ms);
         let since = time("since")?.unwrap_or(until.saturating_sub(USUAL_MS));
         let span = since..=until;
@@ -102,12 +115,36 @@ impl Wanted {
                 span,
                 is_table: what == "states.csv",
             }),
-            "events" => Ok(Self::Events { robot, span }),
+            "events" => Ok(Self::Events {
+                robot,
+                span,
+                most: number("most", "a number of events")?
+                    .map_or(usize::MAX, |most| most as usize),
+                only: match words.get("only") {
+                    None => Vec::new(),
+                    Some(only) => only.split(',').map(event).collect::<Result<_, _>>()?,
+                },
+            }),
+            "lines" => Ok(Self::Lines { robot, span }),
             "moment" => Ok(Self::Moment {
                 robot,
                 at_ms: time("at")?.unwrap_or(now_ms),
             }),
-            _ => Err("the history has states.csv, states, events and moment".to_owned()),
+            _ => Err("the history has states.csv, states, events, lines and moment".to_owned()),
+        }
+    }
+}
+
+/// The word of an event, if it is one.
+fn event(word: &str) -> Result<String, String> {
+    match Happened::all().any(|kind| kind.as_str() == word) {
+        true => Ok(word.to_owned()),
+        false => {
+            let all: Vec<_> = Happened::all().map(Happened::as_str).collect();
+            Err(format!(
+                "only={word}: {word} is no event; {} are",
+                all.join(", ")
+            ))
         }
     }
 }
@@ -214,11 +251,33 @@ fn tell(history: &History, wanted: Wanted, pieces: &mut Pieces) -> io::Result<()
                 }
             })
         }
-        Wanted::Events { robot, span } => {
-            let events = history.events(Some(&robot), &span)?;
-            let mut events = events.iter();
+        Wanted::Events {
+            robot,
+            span,
+            most,
+            only,
+        } => {
+            let mut events = history.events(Some(&robot), &span)?;
+            events.retain(|(_, _, text)| is_of(text, &only));
+            let mut events = events.iter().skip(events.len().saturating_sub(most));
             let _ = events.try_for_each(|(_, at_ms, text)| pieces.line(&line(*at_ms, text)));
             Ok(())
+        }
+        Wanted::Lines { robot, span } => {
+            let mut next_ms = 0;
+            history.states(&robot, &span, |entry| {
+                let is_wanted = match entry.word() {
+                    "state" => entry.at_ms >= next_ms,
+                    word => word == "latency",
+                };
+                if entry.is_state() && is_wanted {
+                    next_ms = entry.at_ms + APART_MS;
+                }
+                match is_wanted {
+                    true => pieces.line(&line(entry.at_ms, entry.line)),
+                    false => ControlFlow::Continue(()),
+                }
+            })
         }
         Wanted::Moment { robot, at_ms } => {
             let known = history.moment(&robot, at_ms)?;
@@ -227,6 +286,14 @@ fn tell(history: &History, wanted: Wanted, pieces: &mut Pieces) -> io::Result<()
             Ok(())
         }
     }
+}
+
+/// Whether a line is an event of one of these kinds; if there are none, every line is.
+fn is_of(line: &str, only: &[String]) -> bool {
+    let kind = line
+        .strip_prefix("event ")
+        .and_then(|rest| rest.split(' ').next());
+    only.is_empty() || kind.is_some_and(|kind| only.iter().any(|one| one == kind))
 }
 
 /// A column of the table.
@@ -361,7 +428,9 @@ mod tests {
             read("events", "since=5&robot=r1&until=7"),
             Ok(Wanted::Events {
                 robot: robot.clone(),
-                span: 5..=7
+                span: 5..=7,
+                most: usize::MAX,
+                only: Vec::new(),
             })
         );
         assert_eq!(
@@ -377,11 +446,30 @@ mod tests {
                 "robot=r1&untill=5",
                 "untill stands in the address",
             ),
-            ("all", "robot=r1", "states.csv, states, events and moment"),
+            (
+                "all",
+                "robot=r1",
+                "states.csv, states, events, lines and moment",
+            ),
+            (
+                "events",
+                "robot=r1&most=all",
+                "most=all: a number of events",
+            ),
+            ("events", "robot=r1&only=stopped,fell", "fell is no event"),
         ] {
             let why = read(what, query).unwrap_err();
             assert!(why.contains(words), "{why}");
         }
+    }
+
+    #[test]
+    fn only_the_events_that_are_asked_for_are_told() {
+        let only = ["stopped".to_owned()];
+        assert!(is_of("event stopped 1 0 - - ordered comm", &only));
+        assert!(!is_of("event next_node 1 0 - -", &only));
+        assert!(!is_of("thought stopped", &only));
+        assert!(is_of("thought stopped", &[]));
     }
 
     #[test]

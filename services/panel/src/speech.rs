@@ -22,10 +22,13 @@
 //! ```text
 //! you <name> driver|viewer          what this page is called and may do; the first line. A person
 //!                                   asks for a name by the socket's address (`/live?name=Anna`)
+//! time <ms>                         the station's clock, in ms since 1970; first, and after `here`
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
 //! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>
-//!                                   <what>`: a person here wants an action, `stop`, `take` or `free`
+//!                                   <what>`: a person here wants an action or `stop`, has taken the
+//!                                   wheel (`take`), asks for it (`ask`), keeps or leaves it (`keep`,
+//!                                   `free`), or has described the `warehouse`
 //! past <robot> <ms> <report>        the same, from that many ms ago
 //! answer <number> done [<reason>{; <reason>}] | stopped <ms> | refused <reason> | lost <reason>
 //! ```

@@ -9,7 +9,9 @@ use lager_lines::Name;
 use lager_lines::extension::Spelled;
 use lager_orders::{Action, Code, Late, Mode, Reason};
 use lager_plant::Warehouse;
-use lager_station::{Awaited, Doing, Driver, Given, LastTold, Reply, Saving, Subscription, View};
+use lager_station::{
+    Awaited, Doing, Driver, Given, History, LastTold, Reply, Saving, Subscription, View,
+};
 use tokio::sync::watch;
 
 use crate::OpenPage;
@@ -49,6 +51,8 @@ pub(crate) struct Visit {
     warehouse: Option<Option<Warehouse>>,
     revision: Option<u64>,
     about: Instant,
+    /// Whether the page is to be told the station's time.
+    wants_time: bool,
     stayed: Instant,
     there: bool,
     unread: u32,
@@ -72,6 +76,7 @@ impl Visit {
             warehouse: None,
             revision: None,
             about: now,
+            wants_time: true,
             stayed: now,
             there: true,
             unread: 0,
@@ -115,6 +120,7 @@ impl Visit {
         }
         if let Said::Here { said_ms } = said {
             self.late.hear(said_ms, handle.now());
+            self.wants_time = true;
             return;
         }
         let (Said::Do { number, .. }
@@ -148,11 +154,17 @@ impl Visit {
             }
             Said::Keep { robot, .. } if self.wheels.contains_key(&robot) => {
                 self.handover().keep(&robot);
+                self.note(&robot, "keep");
                 self.answer(number, "done");
             }
             Said::Keep { .. } => self.refuse(number, Code::NotDriver),
             Said::Warehouse { warehouse, .. } => match handle.set_warehouse(*warehouse) {
-                Ok(saving) => self.saving.push((number, saving)),
+                Ok(saving) => {
+                    self.saving.push((number, saving));
+                    for view in handle.robots() {
+                        self.note(&view.name, "warehouse");
+                    }
+                }
                 Err(why) => self.refuse(number, why),
             },
             Said::Stop { .. } | Said::Here { .. } => {}
@@ -173,6 +185,7 @@ impl Visit {
         let asked = self.handover().ask(&robot, page, &self.page.name, now);
         match asked {
             Ok(()) => {
+                self.note(&robot, "ask");
                 if let Some(before) = self.asks.insert(robot, number) {
                     self.refuse(before, Code::AskedAnew);
                 }
@@ -272,6 +285,9 @@ impl Visit {
 
     /// The news that the page has not been told yet.
     pub(crate) fn news(&mut self) -> String {
+        if std::mem::take(&mut self.wants_time) {
+            let _ = writeln!(self.lines, "time {}", History::now_ms());
+        }
         self.take_answers();
         self.take_asked();
         self.keep_wheels();
@@ -324,7 +340,14 @@ impl Visit {
         self.stayed = Instant::now();
         if std::mem::take(&mut self.there) {
             // A page that has lost the wheel reads it in the next line about the robot.
-            self.wheels.retain(|_, driver| driver.stay().is_ok());
+            let (handle, name) = (&self.page.shared.handle, &self.page.name);
+            self.wheels.retain(|robot, driver| {
+                let has_stayed = driver.stay().is_ok();
+                if !has_stayed {
+                    handle.note(robot, name, "free");
+                }
+                has_stayed
+            });
         }
     }
 
@@ -386,6 +409,10 @@ impl Drop for Visit {
     fn drop(&mut self) {
         for robot in std::mem::take(&mut self.asks).into_keys() {
             self.handover().withdraw(&robot, self.page.number);
+        }
+        // Nobody has the wheel of a page that is closed.
+        for robot in std::mem::take(&mut self.wheels).into_keys() {
+            self.note(&robot, "free");
         }
     }
 }

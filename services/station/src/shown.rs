@@ -88,7 +88,7 @@ pub enum Saying {
     Asked {
         /// The name by which the station knows this person.
         by: String,
-        /// The wish: the words of an action, `stop`, `take` or `free`.
+        /// The wish: the words of an action, `stop`, `take`, `ask`, `keep`, `free` or `warehouse`.
         what: String,
     },
     /// The robot has answered the action or the stop with this number.

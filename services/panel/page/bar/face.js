@@ -55,7 +55,7 @@ export const age = (ms) => (ms < 60_000 ? `${Math.max(0, Math.floor(ms / 1_000))
 /**
  * How a robot's state looks. What is old is not said as if it were so.
  *
- * @param {Pick<Link, "open" | "me" | "tries" | "closed">} link
+ * @param {Pick<Link, "open" | "me" | "tries" | "closed" | "now">} link
  * @param {Robot | null} robot
  * @param {number} now
  * @returns {Face}
@@ -147,13 +147,13 @@ function does({ state: { phase, next, product, hold, stopped: isStopped } }) {
 /**
  * A latched stop: since when, by whom or why, and that the wheels stand.
  *
- * @param {Pick<Link, "me">} link
+ * @param {Pick<Link, "me" | "now">} link
  * @param {Robot} robot
  * @param {(string | null)[]} more
  */
 function stopped(link, robot, more) {
   const { left_duty: left, right_duty: right, stood_ms: ms } = robot.state;
-  const since = robot.stoppedSince === null ? null : sentence("face_ago", { age: age(Date.now() - robot.stoppedSince) });
+  const since = robot.stoppedSince === null ? null : sentence("face_ago", { age: age(link.now() - robot.stoppedSince) });
   const by = stopper(link, robot);
   const turns = Number(left) || Number(right) ? "turn" : ms === undefined ? "stand" : "stood";
   const proof = left === undefined ? null : sentence(`face_wheels_${turns}`, { ms });

@@ -1,136 +1,157 @@
-// What has happened, as sentences in the reader's language; and what the station keeps of the last day as
-// a file.
+// What has happened: each with its time, its kind, a sentence and its place. A row shows its moment on the map, on the
+// time line and in the strips.
 
-import { note } from "../station/report.js";
-import { mcap } from "./mcap.js";
-import { fill, item } from "../missions/missions.js";
-import { PLAIN, called, crossing, reason, sentence, thought } from "../words/sentences.js";
-import { clock, current, put, say, span } from "../words/words.js";
+import { KINDS, kindOf, placeOf, told } from "./kinds.js";
+import { item } from "../missions/missions.js";
+import { crossing } from "../words/sentences.js";
+import { clock, current, put, say } from "../words/words.js";
+import { make } from "../parts/svg.js";
 
-/** How long ago what is saved may be, in ms. */
-const SPANS_MS = [600_000, 3_600_000, 86_400_000];
-/** What a recording has of one moment, by the names of the table's columns. */
-const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "string", "null"] } };
-/** What a recording has of what happened: the words of the station, and a thought's values. */
-const EVENT = {
-  title: "lager.panel.Event",
-  type: "object",
-  required: ["kind", "words", "values"],
-  properties: {
-    kind: { enum: ["event", "thought", "asked"] },
-    words: { type: "array", items: { type: "string" } },
-    values: { type: ["object", "null"], additionalProperties: { type: "string" } },
-  },
-};
+/** So many rows are shown at first, and so many more when somebody asks for them. */
+const ROWS = 200;
 
 export class Log {
-  constructor(parts, robot) {
-    this.parts = parts;
-    this.robot = robot;
-    parts.span.replaceChildren(...SPANS_MS.map((ms) => new Option(span(ms), ms)));
-    parts.csv.onclick = () => this.save("csv", "text/csv", table);
-    parts.mcap.onclick = () => this.save("mcap", "application/octet-stream", recording);
+  /** `kept` knows what has happened, `moment` what is shown. */
+  constructor(parts, { kept, moment, robot }) {
+    Object.assign(this, { parts, kept, moment, robot });
+    /** The kinds that are shown; none: all of them. */
+    this.kinds = new Set();
+    this.rows = new WeakMap();
+    this.most = ROWS;
+    /** The entry whose row was chosen last. */
+    this.chosen = null;
+    this.choices = 0;
+    this.chips = new Map();
+    for (const kind of ["", ...Object.keys(KINDS)]) this.chip(kind);
+    parts.earlier.onclick = () => this.earlier();
+    parts.entries.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  chip(kind) {
+    const chip = document.createElement("button");
+    chip.type = "button";
+    const [word, count] = [document.createElement("span"), document.createElement("b")];
+    word.dataset.word = kind ? KINDS[kind][0] : "log_all";
+    put(word, say(word.dataset.word));
+    if (kind) chip.append(icon(kind));
+    chip.append(word, " ", count);
+    chip.onclick = () => {
+      if (!kind) this.kinds.clear();
+      else if (!this.kinds.delete(kind)) this.kinds.add(kind);
+    };
+    this.chips.set(kind, { chip, count });
+    this.parts.kinds.append(chip);
   }
 
   draw(robot) {
-    const { filter, entries, csv, mcap } = this.parts;
-    csv.disabled = mcap.disabled = !robot || this.saving;
-    const events = robot?.events ?? [];
-    const shown = [robot?.name, events.length, events.at(-1)?.at, filter.value, current()].join();
+    const { filter, entries, earlier, panel } = this.parts;
     // Nobody reads it while another view is open.
-    if (entries.parentElement.hidden || this.shown === shown) return;
+    if (panel.hidden) return;
+    const all = this.kept.all(robot);
+    const shown = [robot?.name, all.length, all[0]?.at, all.at(-1)?.at, filter.value, [...this.kinds], this.most, current(), this.moment.at, this.choices].join();
+    earlier.disabled = !robot || this.kept.isFetching;
+    if (this.shown === shown) return;
     this.shown = shown;
-    const wanted = filter.value.toLowerCase();
-    const lines = events.map(line).filter((text) => text.toLowerCase().includes(wanted));
-    if (!lines.length) lines.push(say("log_empty"));
-    fill(entries, lines.slice(-200).reverse(), (text) => item(text));
-  }
-
-  /** Hands what the station keeps of the chosen time to the reader as a file. */
-  async save(ending, type, content) {
-    const robot = this.robot();
-    if (!robot || this.saving) return;
-    this.saving = true;
-    put(this.parts.said, "");
-    const until = Date.now();
-    const query = new URLSearchParams({ robot: robot.name, since: until - Number(this.parts.span.value), until });
-    try {
-      const anchor = document.createElement("a");
-      anchor.href = URL.createObjectURL(new Blob([await content(query)], { type }));
-      anchor.download = `${robot.name}.${ending}`;
-      anchor.click();
-      setTimeout(() => URL.revokeObjectURL(anchor.href), 1_000);
-    } catch (error) {
-      put(this.parts.said, say(error instanceof Refused ? error.message : "lost"));
-    } finally {
-      this.saving = false;
+    const counts = {};
+    for (const entry of all) counts[kindOf(entry)] = (counts[kindOf(entry)] ?? 0) + 1;
+    for (const [kind, { chip, count }] of this.chips) {
+      put(count, String(kind ? counts[kind] ?? 0 : all.length));
+      chip.setAttribute("aria-pressed", kind ? this.kinds.has(kind) : !this.kinds.size);
     }
+    const words = filter.value.toLowerCase();
+    const wanted = all.filter((entry) => (!this.kinds.size || this.kinds.has(kindOf(entry))) && (!words || this.row(entry).words.includes(words)));
+    this.hasMore = wanted.length > this.most;
+    earlier.hidden = !this.hasMore && this.kept.isAll;
+    this.fill(wanted.slice(-this.most).reverse().map((entry) => this.row(entry)));
+    // The one that was chosen, of several at once, or else the last one that had happened by then.
+    const at = this.moment.at;
+    const now = at === null ? null : wanted.find((entry) => entry === this.chosen && entry.at === at) ?? wanted.findLast((entry) => entry.at <= at);
+    for (const row of this.shownRows) {
+      row.button.classList.toggle("later", at !== null && row.at > at);
+      if (row.entry === now) row.button.setAttribute("aria-current", "true");
+      else row.button.removeAttribute("aria-current");
+    }
+    if (this.drawnAt !== at && now) this.reveal(this.row(now).element);
+    this.drawnAt = at;
+    if (!this.shownRows.length) entries.replaceChildren(item(say("log_empty")));
+  }
+
+  /** Only what is new is put in: what has the focus keeps it. */
+  fill(rows) {
+    const { entries } = this.parts;
+    if (!this.shownRows?.length) entries.replaceChildren();
+    this.shownRows = rows;
+    const kept = new Set(rows.map(({ element }) => element));
+    for (const element of [...entries.children]) if (!kept.has(element)) element.remove();
+    rows.forEach(({ element }, index) => {
+      if (entries.children[index] !== element) entries.insertBefore(element, entries.children[index] ?? null);
+    });
+    // One of them is reached by the Tab key, and the arrows go on from there.
+    const focused = rows.find(({ button }) => button === document.activeElement) ?? rows[0];
+    for (const { button } of rows) button.tabIndex = button === focused?.button ? 0 : -1;
+  }
+
+  /** Scrolls the list, and not the page, until a row is seen. */
+  reveal({ offsetTop: top, offsetHeight: height }) {
+    const { entries } = this.parts;
+    if (top < entries.scrollTop) entries.scrollTop = top;
+    else if (top + height > entries.scrollTop + entries.clientHeight) entries.scrollTop = top + height - entries.clientHeight;
+  }
+
+  row(entry) {
+    let row = this.rows.get(entry);
+    if (row?.language === current()) return row;
+    const kind = kindOf(entry);
+    const [time, word, sentence, place] = [clock(entry.at), say(KINDS[kind][0]), told(entry), placeOf(entry)];
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "entry";
+    button.dataset.kind = kind;
+    const cell = (text, name) => Object.assign(document.createElement(name), { textContent: text });
+    const when = cell(time, "time");
+    when.dateTime = new Date(entry.at).toISOString();
+    button.append(when, icon(kind), cell(word, "b"), " ", cell(sentence, "span"), " ", cell(place, "small"));
+    button.onclick = () => {
+      this.chosen = entry;
+      this.choices += 1;
+      this.moment.go(entry.at);
+      // In the hand the map may be out of sight.
+      this.parts.map.scrollIntoView({ block: "nearest" });
+    };
+    const element = document.createElement("li");
+    element.append(button);
+    row = { entry, at: entry.at, button, element, language: current(), words: `${time} ${word} ${sentence} ${place} ${crossing(place || undefined)}`.toLowerCase() };
+    this.rows.set(entry, row);
+    return row;
+  }
+
+  /** The arrows go from row to row, while they do not drive. */
+  key(event) {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    const at = this.shownRows?.findIndex(({ button }) => button === event.target) ?? -1;
+    const next = step && !this.moment.isArmed() && at >= 0 && this.shownRows[at + step];
+    if (!next) return;
+    event.preventDefault();
+    event.target.tabIndex = -1;
+    next.button.tabIndex = 0;
+    next.button.focus();
+  }
+
+  /** Shows what happened before; what the page does not hold is asked of the station. */
+  async earlier() {
+    const robot = this.robot();
+    if (!robot) return;
+    put(this.parts.said, "");
+    this.most += ROWS;
+    if (this.hasMore) return;
+    const refused = await this.kept.earlier(robot);
+    if (refused) put(this.parts.said, say(refused));
+    else if (this.kept.isAll) put(this.parts.said, say("log_no_earlier"));
   }
 }
 
-/** The station gives nothing of its history; the message is the word for why. */
-class Refused extends Error {}
-
-/** What the station's history says to this. */
-async function ask(what, query) {
-  const answer = await fetch(new URL(`history/${what}?${query}`, location.href), { cache: "no-store" });
-  if (answer.ok) return answer;
-  throw new Refused({ 404: "no_history", 503: "history_busy" }[answer.status] ?? "lost");
-}
-
-/** The same, an object from each line. */
-async function lines(what, query) {
-  const text = await (await ask(what, query)).text();
-  return text.split("\n").filter(Boolean).map((line) => JSON.parse(line));
-}
-
-const table = async (query) => (await ask("states.csv", query)).blob();
-
-/** The figures of the table, and what happened meanwhile. */
-async function recording(query) {
-  const states = (await lines("states", query)).map(({ at_ms: at, ...value }) => ({ at, value }));
-  const past = { thinks: null, events: [], happened: (entry) => past.events.push(entry) };
-  for (const { at_ms: at, line } of await lines("events", query)) {
-    const [word, ...rest] = line.split(" ");
-    note(past, word, rest, at);
-  }
-  const events = past.events.map(({ at, kind, words, values }) => ({ at, value: { kind, words, values } }));
-  return mcap("lager panel", [
-    { topic: "state", schema: STATE, messages: states },
-    { topic: "events", schema: EVENT, messages: events },
-  ]);
-}
-
-/** One entry as a sentence with its time. */
-function line({ at, kind, words, values }) {
-  const time = clock(at);
-  if (kind === "refused") return `${time}  ${say("blocked", reason(words[0]))}`;
-  if (kind === "thought") return `${time}  ${say("thinks", (values && thought(values)) ?? words.join(" "))}`;
-  if (kind === "asked") return `${time}  ${asked(words)}`;
-  const [what, x, y, , product, ...more] = words;
-  return `${time}  ${sentence(`event_${what}`, { product, node: crossing(`${x},${y}`), ...about(more) }) ?? what}`;
-}
-
-/** What a person calls the parts of a robot that stop it for him. */
-const BY = { comm: "by_comm", operator: "by_operator" };
-
-/** What an event is about besides its place and its goods. */
-function about([first, second]) {
-  const cause = (first !== "none" && sentence(`stop_cause_${first}`)) || "\u2013";
-  return { cause, by: BY[second] ? say(BY[second]) : second, mode: say(`mode_${first}`), service: first };
-}
-
-/** Who at a page has asked for what. */
-function asked([name, what, first, ...more]) {
-  const who = called(name);
-  const of = {
-    mode: () => say(`mode_${first}`),
-    order: () => more[0],
-    resume: () => "",
-    obstacle: () => crossing(more.slice(0, 2).join()),
-    place: () => [crossing(`${first},${more[0]}`), sentence(`looks_${more[1]}`)].join(" "),
-  };
-  // What takes no words is called as its button is.
-  if (PLAIN.includes(what)) return `${who}: ${[sentence(`do_${what}`), first].filter(Boolean).join(" ")}`;
-  return say(`did_${what}${["obstacle", "pick"].includes(what) ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
+function icon(kind) {
+  const svg = make("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" });
+  make("path", { d: KINDS[kind][1] }, svg);
+  return svg;
 }

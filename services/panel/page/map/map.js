@@ -92,6 +92,12 @@ export class WarehouseMap {
      * @type {(Pose & { at: number }) | null}
      */
     this.shown = null;
+    /**
+     * Whose pose that is.
+     *
+     * @type {Model | null}
+     */
+    this.of = null;
     this.aim = new Aim(this, hand);
     tools.zoomIn.onclick = () => this.zoom(0.8);
     tools.zoomOut.onclick = () => this.zoom(1.25);
@@ -167,7 +173,8 @@ export class WarehouseMap {
     if (robot?.truth) this.ghost.move(robot.truth);
     if (!robot?.pose) return;
     const { unsure } = robot.pose;
-    const pose = this.glide(this.floor.onWayOut(robot.pose), now, stale);
+    const pose = this.glide(this.floor.onWayOut(robot.pose), now, stale, this.of !== robot);
+    this.of = robot;
     this.body.move(pose);
     this.labels.follow("chip", [pose.x, -pose.y]);
     // Where the axle may be: as wide as odometry is wrong until the next mark, and as it was driven by hand since.
@@ -184,10 +191,11 @@ export class WarehouseMap {
    * @param {Model | null} robot
    * @param {Model[]} others
    * @param {number} now
-   * @param {Face} state
+   * @param {Face | null} state
    */
   draw(robot, others, now, state) {
     this.state = state;
+    this.svg.dataset.look = state?.look ?? "none";
     put(this.words, this.describe(robot));
     if (robot) {
       this.ways.drawThings(robot, this.side, this.px);
@@ -321,19 +329,20 @@ export class WarehouseMap {
   }
 
   /**
-   * Where to draw between two poses.
+   * Where to draw between two poses; another robot, or the same at another time, is where it is at once.
    *
    * @param {Pose} aim
    * @param {number} now
    * @param {boolean} stale
+   * @param {boolean} isOther
    * @returns {Pose}
    */
-  glide(aim, now, stale) {
+  glide(aim, now, stale, isOther) {
     const still = REDUCED.matches;
     const shown = this.shown;
-    if (!shown || still || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500) {
+    if (!shown || still || isOther || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500) {
       this.shown = { ...aim, at: now };
-      return stale && shown ? shown : aim;
+      return aim;
     }
     if (stale) return shown;
     const part = Math.min(1, (now - shown.at) / GLIDE_MS);

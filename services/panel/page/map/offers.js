@@ -26,9 +26,10 @@ import { clock, say } from "../words/words.js";
  * @param {(way: string) => unknown} page.obstacle puts an obstacle there or takes it away
  * @param {(square: Point, side: Side) => unknown} page.goods puts goods at the side of a square
  * @param {() => number} page.now
+ * @param {() => boolean} page.isPast whether the map shows the past; `robot` is the past one then
  * @returns {(target: Target | null) => Offer}
  */
-export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now }) {
+export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now, isPast }) {
   /**
    * Goods are fetched; those that are not in their place, after a question.
    *
@@ -104,9 +105,18 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
     return shown.isStale(now()) ? say("old") : undefined;
   }
 
-  return (target) => {
+  /**
+   * What a thing is, what a click does, or why a click does nothing.
+   *
+   * @param {Target | null} target
+   * @returns {Offer}
+   */
+  function offer(target) {
     if (!target) return { why: say("nothing_here") };
     if (target.kind === "square") return place(target);
     return { good, crossing: node, way }[target.kind](target.id);
-  };
+  }
+
+  // While the map shows the past, nothing on it is ordered.
+  return (target) => (isPast() ? { what: offer(target).what, why: say("past_orders") } : offer(target));
 }

@@ -69,11 +69,12 @@ export class Strips {
   }
 
   /**
-   * Figures and sensors.
+   * Figures and sensors of a robot at a time.
    *
    * @param {Robot | null} robot
+   * @param {number} now
    */
-  draw(robot) {
+  draw(robot, now) {
     const dark = DARK.matches;
     if (this.dark !== dark) {
       this.dark = dark;
@@ -81,7 +82,7 @@ export class Strips {
       this.colours = [style.getPropertyValue("--accent"), style.getPropertyValue("--quiet")];
     }
     const { colours } = this;
-    for (const strip of this.strips) strip.draw(robot, colours);
+    for (const strip of this.strips) strip.draw(robot, now, colours);
     put(this.caption, say("line_sensors"));
     const seen = sensors(robot?.state);
     this.sensors.forEach((bar, index) => bar.classList.toggle("on", seen?.[index] === "1"));
@@ -147,9 +148,10 @@ class Strip {
    * The last figures, and what the lines look like.
    *
    * @param {Robot | null} robot
+   * @param {number} now
    * @param {string[]} colours
    */
-  draw(robot, colours) {
+  draw(robot, now, colours) {
     const last = robot?.past.at(-1);
     const known = this.keys.flatMap((key) => last?.[key] ?? []);
     const text = `${say(this.word)} ${known.length ? told(known, this.unit) : "–"}`;
@@ -157,7 +159,7 @@ class Strip {
 
     const ratio = devicePixelRatio;
     const [width, height] = [Math.round(this.box.width * ratio), Math.round(this.box.height * ratio)];
-    const since = performance.now() - SPAN_MS;
+    const since = now - SPAN_MS;
     const seen = (robot?.past ?? []).filter(({ at }) => at > since);
     this.top = this.high ?? Math.max(1, ...seen.flatMap((point) => this.keys.map((key) => point[key] ?? 0)));
     this.colours = colours;

@@ -3,10 +3,11 @@
 // What the station says, one or more lines in a message (services/panel/src/speech.rs):
 //
 //   you <name> driver|viewer
+//   time <ms>                         the station's clock, in ms since 1970; first, and once a second
 //   warehouse <json>
 //   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
-//   from <robot> asked <who> <what>   a person here wants an action, stop, take or free
+//   from <robot> asked <who> <what>   a person here wants an action, stop, take, ask, keep, free or warehouse
 //   past <robot> <ms> <an event, a thought or what was asked so long ago>
 //   answer <number> done [<reason>{; <reason>}] | refused <reason> | stopped <ms> | lost <reason>
 //
@@ -45,6 +46,8 @@ import { Robot } from "./robot.js";
 const HERE_MS = 1_000;
 /** Said where the panel no longer knows the browser: `up` was started anew, or the cookie is gone. */
 const NO_TOKEN = "no_token";
+/** A clock that goes back by more than this was set, in ms. */
+const SET_MS = 1_000;
 const RETRY_MS = [250, 500, 1_000, 2_000];
 
 export class Link extends EventTarget {
@@ -76,8 +79,27 @@ export class Link extends EventTarget {
      */
     this.waiting = new Map();
     this.tries = 0;
+    /** How far the station's clock is ahead of this page's, in ms; the browser's own may be wrong. */
+    this.ahead = Date.now() - performance.now();
+    this.isTimed = false;
     this.socket = this.connect();
     setInterval(() => this.open && this.send("here", clock()), HERE_MS);
+  }
+
+  /** This moment by the station's clock, in whole ms since 1970. */
+  now() {
+    return Math.round(performance.now() + this.ahead);
+  }
+
+  /**
+   * The station has told its time. The way here takes some, so the most that it is ahead counts, unless it was set.
+   *
+   * @param {number} ms since 1970
+   */
+  setTime(ms) {
+    const ahead = ms - performance.now();
+    if (!this.isTimed || ahead > this.ahead || ahead < this.ahead - SET_MS) this.ahead = ahead;
+    this.isTimed = true;
   }
 
   /** @returns {WebSocket} */
@@ -163,7 +185,7 @@ export class Link extends EventTarget {
     // A command that is given again and again is refused as often.
     const last = asked?.events.at(-1);
     const isSame = last?.kind === "refused" && last.words[0] === refused;
-    if (asked && refused && !isSame) asked.happened({ at: Date.now(), kind: "refused", words: [refused], values: null });
+    if (asked && refused && !isSame) asked.happened({ at: this.now(), kind: "refused", words: [refused], values: null });
     return answer;
   }
 
@@ -192,14 +214,16 @@ export class Link extends EventTarget {
     const [word, first = "", ...rest] = line.split(" ");
     if (word === "from") {
       const [what = "", ...more] = rest;
-      report(this.robot(first), what, more, performance.now(), Date.now());
+      report(this.robot(first), what, more, performance.now(), this.now());
     } else if (word === "past") {
       const [age, what = "", ...more] = rest;
-      report(this.robot(first), what, more, performance.now(), Date.now() - Number(age));
+      report(this.robot(first), what, more, performance.now(), this.now() - Number(age));
     } else if (word === "about") {
       this.about(this.robot(first), fields(rest));
     } else if (word === "answer") {
       this.answer(first, rest);
+    } else if (word === "time") {
+      this.setTime(Number(first));
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");

@@ -64,6 +64,11 @@ const WORDS = {
     pause: "Pause", go_live: "Go live", paused: "paused, {0} behind", time_window: "time that is shown", zoom_back: "Zoom back", lanes_how: "signals; left and right move the cursor", newest: "Newest", at_cursor: "At the cursor",
     history_fetched: "The last ten minutes are being fetched.", unit_sensors: "sensors", unit_lost: "in 1 s", lane_duty: "duty", lane_distance: "distance ahead", lane_path: "path latency", lane_lost: "lost packets",
     path_histogram: "Path latency, sensor to decision", frames_told: "{0} frames since this page was opened; heights are square roots", frames_none: "No frame has been measured yet.", lost_by_minute: "Packets lost each minute", lost_in_all: "{0} in ten minutes",
+    time_line: "time line", time_span: "how long the time line is", time_now: "Now", time_before: "what happened before (K)", time_after: "what happened after (J)",
+    moment: "the moment {0}", moment_ago: "the moment {0}, {1} ago", moment_none: "The station has kept nothing of this moment.", past_orders: "this is the past: press “Now”, then click",
+    log_all: "All", log_stop: "stop", log_help: "help", log_goods: "goods", log_ways: "way", log_persons: "person", log_link: "link", log_battery: "battery", log_settings: "settings",
+    log_kinds: "which kinds are shown", log_earlier: "Earlier", log_no_earlier: "The station has kept nothing from before that.",
+    did_ask: "{0} asks for the wheel", did_keep: "{0} keeps the wheel", did_warehouse: "{0} describes the warehouse anew",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -125,6 +130,11 @@ const WORDS = {
     pause: "Pausa", go_live: "Visa nuet", paused: "pausad, {0} efter", time_window: "tid som visas", zoom_back: "Zooma tillbaka", lanes_how: "signaler; vänster och höger flyttar markören", newest: "Nyast", at_cursor: "Vid markören",
     history_fetched: "De senaste tio minuterna hämtas.", unit_sensors: "sensorer", unit_lost: "på 1 s", lane_duty: "pådrag", lane_distance: "avstånd framåt", lane_path: "fördröjning", lane_lost: "förlorade paket",
     path_histogram: "Fördröjning från sensor till beslut", frames_told: "{0} mätningar sedan sidan öppnades; höjderna är kvadratrötter", frames_none: "Inget har mätts än.", lost_by_minute: "Förlorade paket varje minut", lost_in_all: "{0} på tio minuter",
+    time_line: "tidslinje", time_span: "hur lång tidslinjen är", time_now: "Nu", time_before: "det som hände före (K)", time_after: "det som hände efter (J)",
+    moment: "ögonblicket {0}", moment_ago: "ögonblicket {0}, för {1} sedan", moment_none: "Stationen har inte sparat något av det ögonblicket.", past_orders: "detta är det förflutna: tryck på ”Nu”, klicka sedan",
+    log_all: "Allt", log_stop: "stopp", log_help: "hjälp", log_goods: "varor", log_ways: "väg", log_persons: "person", log_link: "länk", log_battery: "batteri", log_settings: "inställning",
+    log_kinds: "vilka slag som visas", log_earlier: "Tidigare", log_no_earlier: "Stationen har inte sparat något från tiden före det.",
+    did_ask: "{0} ber om ratten", did_keep: "{0} behåller ratten", did_warehouse: "{0} beskriver lagret på nytt",
   },
 };
 
@@ -187,7 +197,7 @@ export function decimal(value) {
  * @param {number} at
  */
 export function clock(at) {
-  return new Date(at).toLocaleTimeString(current());
+  return new Date(at).toLocaleTimeString(current(), { hourCycle: "h23", hour: "2-digit", minute: "2-digit", second: "2-digit" });
 }
 
 /**

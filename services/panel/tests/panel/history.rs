@@ -172,7 +172,7 @@ fn the_history_has_the_doors_of_all_else() {
         ),
         (
             "everything?robot=r1",
-            "states.csv, states, events and moment",
+            "states.csv, states, events, lines and moment",
         ),
     ] {
         let answer = panel.ask_as_driver(&format!("/history/{asked}"));

@@ -1,0 +1,68 @@
+// What the station keeps of the last day as a file: a table, or a recording.
+
+import { entries } from "../time/kept.js";
+import { mcap } from "./mcap.js";
+import { ask, lines, why } from "../station/history.js";
+import { put, say, span } from "../words/words.js";
+
+/** How long ago what is saved may be, in ms. */
+const SPANS_MS = [600_000, 3_600_000, 86_400_000];
+/** What a recording has of one moment, by the names of the table's columns. */
+const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "string", "null"] } };
+/** What a recording has of what happened: the words of the station, and a thought's values. */
+const EVENT = {
+  title: "lager.panel.Event",
+  type: "object",
+  required: ["kind", "words", "values"],
+  properties: {
+    kind: { enum: ["event", "thought", "asked"] },
+    words: { type: "array", items: { type: "string" } },
+    values: { type: ["object", "null"], additionalProperties: { type: "string" } },
+  },
+};
+
+export class Save {
+  constructor(link, parts, robot) {
+    Object.assign(this, { link, parts, robot });
+    parts.span.replaceChildren(...SPANS_MS.map((ms) => new Option(span(ms), ms)));
+    parts.csv.onclick = () => this.save("csv", "text/csv", table);
+    parts.mcap.onclick = () => this.save("mcap", "application/octet-stream", recording);
+  }
+
+  draw(robot) {
+    this.parts.csv.disabled = this.parts.mcap.disabled = !robot || this.isSaving;
+  }
+
+  /** Hands what the station keeps of the chosen time to the reader as a file. */
+  async save(ending, type, content) {
+    const robot = this.robot();
+    if (!robot || this.isSaving) return;
+    this.isSaving = true;
+    put(this.parts.said, "");
+    const until = this.link.now();
+    try {
+      const anchor = document.createElement("a");
+      const file = await content({ robot: robot.name, since: until - Number(this.parts.span.value), until });
+      anchor.href = URL.createObjectURL(new Blob([file], { type }));
+      anchor.download = `${robot.name}.${ending}`;
+      anchor.click();
+      setTimeout(() => URL.revokeObjectURL(anchor.href), 1_000);
+    } catch (error) {
+      put(this.parts.said, say(why(error)));
+    } finally {
+      this.isSaving = false;
+    }
+  }
+}
+
+const table = async (query) => (await ask("states.csv", query)).blob();
+
+/** The figures of the table, and what happened meanwhile. */
+async function recording(query) {
+  const states = (await lines("states", query)).map(({ at_ms: at, ...value }) => ({ at, value }));
+  const events = entries(await lines("events", query)).map(({ at, kind, words, values }) => ({ at, value: { kind, words, values } }));
+  return mcap("lager panel", [
+    { topic: "state", schema: STATE, messages: states },
+    { topic: "events", schema: EVENT, messages: events },
+  ]);
+}

@@ -1,0 +1,119 @@
+// What has happened to the robot in view: what the station tells a page, and what was fetched of the time before that.
+
+import { lines, why } from "../station/history.js";
+import { note } from "../station/report.js";
+
+/** The station keeps a day, in ms. */
+export const DAY_MS = 86_400_000;
+/** So much is fetched at a time. */
+const MOST = 500;
+/** Told twice, a thing may be this much earlier or later, in ms: the ways of the two answers differ. */
+const SAME_MS = 500;
+/** What has a mark on the time line. */
+const MARKED = "stopped,item_delivered,failed,pickup_refused,refused";
+
+const isSame = (a, b) => Math.abs(a.at - b.at) < SAME_MS && a.kind === b.kind && String(a.words) === String(b.words);
+
+/**
+ * Two lists in one, each by its times: of the older one, what is before the newer one.
+ *
+ * @template {{ at: number, kind: string, words: string[] }} E
+ * @param {E[]} older
+ * @param {E[]} newer
+ * @returns {E[]}
+ */
+function joined(older, newer) {
+  if (!older.length) return newer;
+  const from = newer[0]?.at ?? Infinity;
+  const near = newer.filter(({ at }) => at < from + 2 * SAME_MS);
+  return [...older.filter((one) => one.at < from + SAME_MS && !near.some((other) => isSame(one, other))), ...newer].sort((a, b) => a.at - b.at);
+}
+
+/**
+ * Entries of the log from lines of the station's history.
+ *
+ * @param {{ at_ms: number, line: string }[]} told
+ */
+export function entries(told) {
+  const past = { thinks: null, events: [], happened: (entry) => past.events.push(entry) };
+  for (const { at_ms: at, line } of told) {
+    const [word, ...rest] = line.split(" ");
+    note(past, word, rest, at);
+  }
+  return past.events;
+}
+
+export class Kept {
+  constructor(link) {
+    this.link = link;
+    /** What was fetched of the robot of this name. */
+    this.of(null);
+  }
+
+  of(name) {
+    Object.assign(this, { name, fetched: [], marked: null, isAll: false, isFetching: false, list: null, held: null });
+  }
+
+  /**
+   * Everything that is known to have happened to a robot, the oldest first; the same list until it changes.
+   *
+   * @param {import("../station/robot.js").Robot | null} robot
+   */
+  all(robot) {
+    const name = robot?.name ?? null;
+    if (name !== this.name) this.of(name);
+    const held = robot?.events ?? [];
+    const key = [held.length, held[0]?.at, held.at(-1)?.at, this.fetched.length].join();
+    if (this.list && this.held === key) return this.list;
+    // What the page itself lets go stays with what was fetched.
+    if (this.fetched.length) this.fetched = joined(this.fetched, held);
+    this.list = this.fetched.length ? this.fetched : [...held];
+    this.held = [held.length, held[0]?.at, held.at(-1)?.at, this.fetched.length].join();
+    return this.list;
+  }
+
+  /**
+   * Fetches what happened before all that is known.
+   *
+   * @param {import("../station/robot.js").Robot} robot
+   * @returns {Promise<string | null>} the word for why not
+   */
+  async earlier(robot) {
+    if (this.isFetching) return null;
+    this.isFetching = true;
+    const list = this.all(robot);
+    const until = list[0]?.at ?? this.link.now();
+    try {
+      const told = await lines("events", { robot: robot.name, since: until - DAY_MS, until: until + SAME_MS, most: MOST });
+      if (robot.name !== this.name) return null;
+      const older = joined(entries(told), list);
+      this.isAll = older.length === list.length;
+      this.fetched = older;
+      return null;
+    } catch (error) {
+      return why(error);
+    } finally {
+      this.isFetching = false;
+    }
+  }
+
+  /**
+   * Fetches what has a mark on the time line.
+   *
+   * @param {import("../station/robot.js").Robot} robot
+   * @returns {Promise<boolean>} false if the station keeps no history
+   */
+  async marks(robot) {
+    const { name } = robot;
+    this.all(robot);
+    this.marked ??= [];
+    try {
+      const now = this.link.now();
+      const told = entries(await lines("events", { robot: name, since: now - DAY_MS, until: now, only: MARKED }));
+      if (name === this.name) this.marked = told;
+      return true;
+    } catch (error) {
+      return why(error) !== "no_history";
+    }
+  }
+}
