@@ -1,6 +1,8 @@
 // Tells a person who looks elsewhere that a robot needs him: in the title of the page, and if he has asked for it
 // by a message of the browser and by a sound. Browsers show messages only for a page of this machine or over TLS.
 
+import { say } from "../words/words.js";
+import { battery } from "./battery.js";
 import { face } from "./face.js";
 
 /** The looks that only a person ends. */
@@ -13,7 +15,7 @@ const [PITCH, LENGTH] = [660, 0.3];
 export class Notify {
   constructor(link, box) {
     Object.assign(this, { link, box, title: document.title, audio: null });
-    /** Since when each robot has needed somebody, by its name, and whether that has been told. */
+    /** Since when each robot has needed somebody, by its name and whether to charge it, and whether that has been told. */
     this.needing = new Map();
     box.checked = localStorage.getItem("notify") === "yes";
     box.addEventListener("change", () => this.choose());
@@ -35,13 +37,14 @@ export class Notify {
 
   draw(now) {
     const all = [...this.link.robots.values()].map((robot) => ({ robot, ...face(this.link, robot, now) }));
-    const needy = all.filter(isNeedy);
+    const needy = all.map((one) => (isNeedy(one) ? one : alarm(one, now))).filter(Boolean);
     const title = needy.map(({ robot, said }) => `${robot.name}: ${said}`).join("; ");
     document.title = title ? `! ${title}` : this.title;
     const before = this.needing;
-    this.needing = new Map(needy.map(({ robot: { name } }) => [name, before.get(name) ?? { since: now, isTold: false }]));
-    for (const { robot, said, more } of needy) {
-      const need = this.needing.get(robot.name);
+    const key = ({ robot: { name }, look }) => `${name} ${look === "charge"}`;
+    this.needing = new Map(needy.map((one) => [key(one), before.get(key(one)) ?? { since: now, isTold: false }]));
+    for (const one of needy) {
+      const [{ robot, said, more }, need] = [one, this.needing.get(key(one))];
       if (need.isTold || now - need.since < PASSES_MS) continue;
       need.isTold = true;
       if (this.box.checked) this.tell(robot.name, [said, more].filter(Boolean).join(". "));
@@ -65,6 +68,12 @@ export class Notify {
     tone.start();
     tone.stop(this.audio.currentTime + LENGTH);
   }
+}
+
+/** The battery of a robot that still goes is nearly empty. */
+function alarm({ robot }, now) {
+  const { words, isLow } = battery(robot.state);
+  return isLow && !robot.isStale(now) ? { robot, look: "charge", said: say("battery_alarm", words) } : null;
 }
 
 /** Whether a robot waits for a person: to end what is wrong, or to pick goods up. */

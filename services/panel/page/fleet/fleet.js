@@ -1,8 +1,9 @@
 // All robots of the station at a glance, where there are two or more: who needs a person comes first.
 
+import { battery } from "../bar/battery.js";
 import { face, SHAPES } from "../bar/face.js";
 import { make } from "../parts/svg.js";
-import { decimal, put, say } from "../words/words.js";
+import { put, say } from "../words/words.js";
 
 /** The looks, the gravest first. */
 const GRAVITY = Object.keys(SHAPES);
@@ -52,7 +53,6 @@ export class Fleet {
 }
 
 /** Battery and orders. */
-function figures({ state: { battery_dv: decivolts }, queue }) {
-  const volts = decivolts === undefined ? "" : say("volts", decimal(Number(decivolts) / 10));
-  return [volts, queue.length ? say("orders_wait", queue.length) : ""];
+function figures({ state, queue }) {
+  return [battery(state).words, queue.length ? say("orders_wait", queue.length) : ""];
 }

@@ -3,7 +3,7 @@
 
 import { note } from "../station/link.js";
 import { mcap } from "./mcap.js";
-import { fill, item } from "../missions/missions.js";
+import { fill, item } from "../parts/list.js";
 import { PLAIN, called, crossing, reason, sentence, thought } from "../words/sentences.js";
 import { clock, current, put, say, span } from "../words/words.js";
 

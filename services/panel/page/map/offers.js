@@ -7,13 +7,13 @@ import { blockedFor } from "./ways.js";
 import { clock, say } from "../words/words.js";
 
 /**
- * `link` and `robot` as everywhere. `fetch` orders goods or asks whether they are back, `stands` says where the robot
+ * `link` and `robot` as everywhere. `fetch` orders goods, or asks at the `hand` that clicked whether they are back, `stands` says where the robot
  * stands, `obstacle` puts or takes one, `goods` puts goods at the side of a square; `isPlaceWanted` and `now` as named.
  */
 export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now }) {
   const of = {
     /** Goods are fetched; those that are not in their place, after a question. */
-    good({ id }) {
+    good({ id, hand }) {
       const { name, square } = link.warehouse.product.find((product) => String(product.id) === id);
       const what = say("tip_good", name ? `${id} ${name}` : id, square.join(","));
       const shown = robot();
@@ -23,7 +23,7 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
       if (turn === 0) return { what, why: say("is_fetched") };
       if (turn > 0) return { what, why: say("waits_as", turn) };
       const why = cannot(shown);
-      const act = why ? undefined : () => fetch(id);
+      const act = why ? undefined : () => fetch(id, hand);
       if (shown.gone.has(id)) {
         const delivery = wasDelivered(shown, id);
         const was = delivery ? say("delivered_at", clock(delivery.at)) : say("away");

@@ -24,6 +24,8 @@
 // Nothing here draws, and nothing here is kept when the page is closed. The station keeps it, and tells
 // on each connection what has happened; its history (services/panel/src/history.rs) has the last day.
 
+import { Jobs } from "./jobs.js";
+
 /** Older than this, in ms, nothing is shown as true. */
 export const STALE_MS = 500;
 /** How long trail and strips look back, in ms. */
@@ -76,16 +78,12 @@ class Robot {
     this.events = [];
     /** The values of the thought that comes next. */
     this.thinks = null;
-    this.history = [];
-    /** When it set out on this order, and the ways that were found blocked on it. */
-    this.began = null;
-    this.detours = [];
-    /** Goods that wait because no way leads to them. */
-    this.unreachable = new Set();
+    this.jobs = new Jobs();
   }
 
   /** Keeps an event, a thought, a refusal or what was asked, by when it was: some are told later. */
   happened(entry) {
+    this.jobs.take(entry);
     const after = this.events.findLastIndex(({ at }) => at <= entry.at);
     this.events.splice(after + 1, 0, entry);
     if (this.events.length > 1_000) this.events.shift();

@@ -1,0 +1,92 @@
+// What was delivered, from the station's history: the same for every browser, and after a reload.
+
+import { Jobs } from "../station/jobs.js";
+import { note } from "../station/link.js";
+import { crossing, sentence } from "../words/sentences.js";
+import { clock, put, say, span } from "../words/words.js";
+import { fill, item } from "../parts/list.js";
+
+/** The answer tells its time in whole seconds; a clock that is no further off is right, in ms. */
+const RIGHT_MS = 2_000;
+/** An answer that did not come is asked for again after this time, in ms. */
+const AGAIN_MS = 10_000;
+
+export class Past {
+  /** `open` shows `list` with its filters and hides `rest`. */
+  constructor(parts) {
+    this.parts = parts;
+    const { open, box, rest, goods, time } = parts;
+    open.onclick = () => {
+      const isOpen = box.hidden;
+      box.hidden = !isOpen;
+      rest.hidden = isOpen;
+      open.setAttribute("aria-expanded", isOpen);
+    };
+    for (const filter of [goods, time]) filter.onchange = () => this.show();
+    this.jobs = [];
+    this.names = new Map();
+  }
+
+  /** The goods that can be chosen. */
+  setNames(names) {
+    this.names = names;
+    const { goods } = this.parts;
+    const { value } = goods;
+    goods.replaceChildren(new Option(say("past_goods"), ""), ...[...names].map(([id, name]) => new Option(name, id)));
+    if (names.has(value)) goods.value = value;
+  }
+
+  draw(robot, now) {
+    this.jobs = robot?.jobs.done ?? [];
+    const today = this.jobs.filter(isToday).length;
+    put(this.parts.open, this.parts.box.hidden ? say("past_open", today) : say("past_close"));
+    if (robot && now - robot.jobs.recalled > AGAIN_MS) recall(robot, now);
+    this.show();
+  }
+
+  show() {
+    const { goods, time, totals, list } = this.parts;
+    const jobs = this.jobs.filter((job) => (!goods.value || job.product === goods.value) && (time.value !== "today" || isToday(job)));
+    const all = this.jobs.filter((job) => !goods.value || job.product === goods.value);
+    put(totals, say("past_totals", all.filter(isToday).length, all.length));
+    fill(list, jobs.length ? jobs.map((job) => delivered(job, this.names)) : [say("history_empty")], (line) => item(line));
+  }
+}
+
+const isToday = ({ at }) => at >= new Date().setHours(0, 0, 0, 0);
+
+/** Puts together what the station's history tells of a robot and what this page has heard. */
+async function recall(robot, now) {
+  const { jobs } = robot;
+  jobs.recalled = now;
+  const query = new URLSearchParams({ robot: robot.name, since: "0" });
+  const answer = await fetch(new URL(`history/events?${query}`, location.href), { cache: "no-store" }).catch(() => null);
+  // A station without a history has none later either.
+  if (answer?.status === 404) jobs.recalled = Infinity;
+  if (!answer?.ok) return;
+  const off = Date.now() - Date.parse(answer.headers.get("date") ?? "");
+  const shift = Math.abs(off) > RIGHT_MS ? off : 0;
+  const text = await answer.text().catch(() => null);
+  // It has connected anew meanwhile.
+  if (text === null || robot.jobs !== jobs) return;
+  const past = { thinks: null, happened: () => {} };
+  const told = text.split("\n").filter(Boolean).map((line) => {
+    const { at_ms: at, line: words } = JSON.parse(line);
+    const [word, ...rest] = words.split(" ");
+    return note(past, word, rest, at + shift);
+  });
+  const whole = new Jobs();
+  whole.recalled = Infinity;
+  const entries = [...told.filter(Boolean), ...robot.events].sort((one, other) => one.at - other.at);
+  for (const entry of entries) whole.take(entry);
+  robot.jobs = whole;
+}
+
+/** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
+function delivered({ product, at, began, detours }, names) {
+  const name = names.get(product) ?? product;
+  const words = [clock(at), began === undefined ? name : say("took", name, span(at - began))];
+  const ways = detours.map(({ node, looks }) => `${crossing(node)} ${sentence(`looks_${looks}`) ?? ""}`.trim());
+  if (ways.length) words.push(say("detours", ways.join("; ")));
+  return words.join("  ");
+}
