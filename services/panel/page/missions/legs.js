@@ -5,17 +5,18 @@ const LATEST = 5;
 
 /**
  * @typedef {import("../station/jobs.js").Job} Job
- * @typedef {{ done: Job[], crossing: number | null, back: number }} Known
+ * @typedef {{ done: Job[], far: (product: string) => number | undefined, crossing: number | null, back: number }} Known
  */
 
 /**
  * What past orders teach, the newest first: ms for each crossing, and from a delivery to the next order.
  * @param {Job[]} done
+ * @param {(product: string) => number | undefined} far how many crossings goods are away from delivery
  * @returns {Known}
  */
-export function learn(done) {
+export function learn(done, far) {
   const after = (until) => median(done.flatMap((job) => (job.at !== undefined && job[until] !== undefined ? [job[until] - job.at] : [])));
-  return { done, crossing: median(done.flatMap(({ legs }) => legs)), back: after("next") ?? after("back") ?? 0 };
+  return { done, far, crossing: median(done.flatMap(({ legs }) => legs)), back: after("next") ?? after("back") ?? 0 };
 }
 
 /**
@@ -37,9 +38,8 @@ export function left(job, known, now) {
  * @returns {{ arrived: number | null, picked: number | null, at: number | null }}
  */
 export function ends(job, known) {
-  const { product, crossings } = job;
   const after = (before, from, to) => {
-    const ms = before === null ? null : part(known, product, crossings, from, to);
+    const ms = before === null ? null : part(known, job.product, from, to);
     return ms === null ? null : before + ms;
   };
   const arrived = job.arrived ?? after(job.began ?? null, "began", "arrived");
@@ -50,15 +50,15 @@ export function ends(job, known) {
 /**
  * In how many ms each of the orders that wait is delivered, in their order; null: not known.
  * @param {number | null} first in how many ms the one under way is delivered; 0 where there is none
- * @param {{ product: string, crossings?: number }[]} orders
+ * @param {string[]} products
  * @param {Known} known
  * @param {boolean} isAway the robot still has to come back from a delivery before it sets out
  * @returns {(number | null)[]}
  */
-export function waits(first, orders, known, isAway) {
+export function waits(first, products, known, isAway) {
   let at = first;
-  return orders.map(({ product, crossings }, index) => {
-    const whole = ends({ product, crossings, order: "", began: 0, detours: [], legs: [] }, known).at;
+  return products.map((product, index) => {
+    const whole = ends({ product, order: "", began: 0, detours: [], legs: [] }, known).at;
     at = at === null || whole === null ? null : at + whole + (index > 0 || isAway ? known.back : 0);
     return at;
   });
@@ -77,15 +77,16 @@ export function crossingsTo(warehouse, product) {
 }
 
 /** How long one part of an order takes: as these goods took, or as others took and the way that is longer or shorter. */
-function part({ done, crossing }, product, crossings, from, to) {
+function part({ done, far, crossing }, product, from, to) {
   const took = (jobs, of = (ms) => ms) => jobs.flatMap((job) => (job[from] === undefined || job[to] === undefined ? [] : [of(job[to] - job[from], job)]));
   const own = took(done.filter((job) => job.product === product));
   if (own.length) return median(own.slice(0, LATEST));
   // To pick up takes as long everywhere.
   if (from === "arrived") return median(took(done).slice(0, LATEST));
+  const crossings = far(product);
   if (crossings === undefined || crossing === null) return null;
-  const others = done.filter((job) => job.crossings !== undefined);
-  const rest = median(took(others, (ms, job) => ms - job.crossings * crossing));
+  const others = done.filter((job) => far(job.product) !== undefined);
+  const rest = median(took(others, (ms, job) => ms - far(job.product) * crossing));
   return rest === null ? null : Math.max(0, rest + crossings * crossing);
 }
 

@@ -25,7 +25,8 @@ export class Missions {
     this.ordered = { at: -Infinity };
     /** What was taken out of a robot's queue last: its products, and how many waited behind. */
     this.taken = null;
-    this.learned = { done: null, count: -1, known: null };
+    /** What past orders teach, and from which. */
+    this.learned = {};
     this.order = new Order({ card: parts.order, number: parts.orderNumber, name: parts.orderName, where: parts.orderWhere, time: parts.orderTime, steps: parts.orderSteps });
     this.queue = new Queue(parts.queue, { isArmed, move: (...where) => this.move(...where), cancel: (order) => this.cancel(order) });
     this.tiles = new Tiles({ form: parts.fetch, field: parts.goods, tiles: parts.tiles, said: parts.said }, {
@@ -148,6 +149,7 @@ export class Missions {
 
   setWarehouse(warehouse) {
     this.warehouse = warehouse;
+    this.learned = {};
     const goods = warehouse?.product ?? [];
     this.goods = new Map(goods.map((one) => [String(one.id), one]));
     this.names = new Map(goods.map(({ id, name = "" }) => [String(id), `${id} ${name}`.trim()]));
@@ -183,7 +185,7 @@ export class Missions {
     this.order.draw(robot, product, this.goods.get(product) ?? {}, isGoing ? known : null, time);
     const first = !isGoing ? null : product === undefined ? 0 : left(jobOf(robot, product), known, time);
     const isAway = product !== undefined || robot?.state.phase === "returning";
-    const ms = isGoing ? waits(first, orders.map(({ product }) => ({ product, crossings: crossingsTo(this.warehouse, product) })), known, isAway) : [];
+    const ms = isGoing ? waits(first, orders.map(({ product }) => product), known, isAway) : [];
     const rows = orders.map(({ order, product }, at) => ({
       order, product, ms: ms[at] ?? null,
       name: this.goods.get(product)?.name || say("goods_numbered", product),
@@ -200,9 +202,11 @@ export class Missions {
 
   /** What past orders teach; it is learned anew when another one is delivered. */
   known(done) {
-    const { learned } = this;
-    const isSame = learned.done === done && learned.count === done.length && learned.back === done[0]?.back;
-    if (!isSame) this.learned = { done, count: done.length, back: done[0]?.back, known: learn(done) };
+    const { done: before, count, after } = this.learned;
+    const last = done[0]?.next ?? done[0]?.back;
+    if (before !== done || count !== done.length || after !== last) {
+      this.learned = { done, count: done.length, after: last, known: learn(done, (product) => crossingsTo(this.warehouse, product)) };
+    }
     return this.learned.known;
   }
 }

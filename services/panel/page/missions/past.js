@@ -7,7 +7,7 @@ import { clock, put, say, span } from "../words/words.js";
 import { fill, item } from "../parts/list.js";
 
 /** The answer tells its time in whole seconds; a clock that is no further off is right, in ms. */
-const RIGHT_MS = 2_000;
+const RIGHT_MS = 1_500;
 /** An answer that did not come is asked for again after this time, in ms. */
 const AGAIN_MS = 10_000;
 
@@ -60,12 +60,15 @@ async function recall(robot, now) {
   const { jobs } = robot;
   jobs.recalled = now;
   const query = new URLSearchParams({ robot: robot.name, since: "0" });
+  const asked = Date.now();
   const answer = await fetch(new URL(`history/events?${query}`, location.href), { cache: "no-store" }).catch(() => null);
   // A station without a history has none later either.
   if (answer?.status === 404) jobs.recalled = Infinity;
   if (!answer?.ok) return;
-  const off = Date.now() - Date.parse(answer.headers.get("date") ?? "");
-  const shift = Math.abs(off) > RIGHT_MS ? off : 0;
+  // It was written between question and answer; else this page's clock is another one.
+  const written = Date.parse(answer.headers.get("date") ?? "");
+  const isRight = written > asked - RIGHT_MS && written < Date.now() + RIGHT_MS;
+  const shift = isRight ? 0 : (asked + Date.now()) / 2 - written || 0;
   const text = await answer.text().catch(() => null);
   // It has connected anew meanwhile.
   if (text === null || robot.jobs !== jobs) return;
@@ -77,8 +80,8 @@ async function recall(robot, now) {
   });
   const whole = new Jobs();
   whole.recalled = Infinity;
-  const entries = [...told.filter(Boolean), ...robot.events].sort((one, other) => one.at - other.at);
-  for (const entry of entries) whole.take(entry);
+  // The history's times are exact; what this page has heard adds what came after them.
+  for (const entry of [...told.filter(Boolean), ...robot.events]) whole.take(entry);
   robot.jobs = whole;
 }
 

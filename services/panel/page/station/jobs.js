@@ -1,13 +1,15 @@
 // The orders that a robot has begun, by its events: what was fetched when, and how far the one under way has come.
 // What is told twice, by the station's history and on a new connection, counts once. Pure: entries in, orders out.
 
-/** What is told again is told with a time that is this near to the first one, in ms. */
-const SAME_MS = 2_000;
+/** What is told again of an order is told with a time that is this near to the first one, in ms. */
+const SAME_MS = 10_000;
+/** A crossing that is told again is told within this time; no two are so near, in ms. */
+const CROSSING_MS = 500;
 
 /**
  * One order. Times are in ms by this page's clock; one that nobody has told is missing.
  * @typedef {{ product: string, order: string, asked?: { at: number, who: string }, began?: number, arrived?: number,
- *   picked?: number, at?: number, back?: number, next?: number, crossings?: number, detours: { node: string, looks: string, at: number }[],
+ *   picked?: number, at?: number, back?: number, next?: number, detours: { node: string, looks: string, at: number }[],
  *   passed?: number, legs: number[] }} Job
  * @typedef {{ at: number, kind: string, words: string[], values: Record<string, string> | null }} Entry
  */
@@ -18,8 +20,6 @@ export class Jobs {
     this.done = [];
     /** @type {Job | null} */
     this.now = null;
-    /** How many crossings it was to the goods that the robot thought of last. */
-    this.far = { product: "", crossings: 0, at: -Infinity };
     /** When and by whom orders were given at a page, by their numbers. */
     this.asked = new Map();
     /** Why orders that wait were put off, by their goods: the kind of the thought that said so. */
@@ -43,12 +43,12 @@ export class Jobs {
     if (what === "getting_item") return this.begin(at, order, product);
     if (what === "item_delivered") return this.deliver(at, order, product);
     const job = this.now;
-    if (!job) return;
+    if (job?.order !== order) return;
     if (what === "in_position") job.arrived ??= at;
     const node = `${x},${y}`;
     const isTold = job.detours.some((one) => one.node === node && one.looks === looks && at - one.at < SAME_MS);
     if (what === "way_blocked" && !isTold) job.detours.push({ node, looks, at });
-    if (what === "next_node" && (job.passed === undefined || at - job.passed > SAME_MS / 4)) {
+    if (what === "next_node" && (job.passed === undefined || at - job.passed > CROSSING_MS)) {
       if (job.passed !== undefined) job.legs.push(at - job.passed);
       job.passed = at;
     }
@@ -56,30 +56,23 @@ export class Jobs {
 
   begin(at, order, product) {
     const [last] = this.done;
-    const isTold = [this.now, last].some((job) => job?.order === order && Math.abs(at - (job.began ?? -Infinity)) < SAME_MS);
+    const isTold = [this.now, ...this.done].some((job) => job?.order === order && Math.abs(at - (job.began ?? -Infinity)) < SAME_MS);
     if (isTold) return;
     // It goes straight on, without coming back first.
     if (last && last.back === undefined) last.next ??= at;
-    const far = this.far.product === product && at - this.far.at < SAME_MS ? this.far.crossings : undefined;
-    this.now = { product, order, asked: this.asked.get(order), began: at, passed: at, crossings: far, detours: [], legs: [] };
+    this.now = { product, order, asked: this.asked.get(order), began: at, passed: at, detours: [], legs: [] };
   }
 
   deliver(at, order, product) {
-    const [last] = this.done;
-    if (last && last.order === order && last.product === product && at - (last.at ?? 0) < SAME_MS) return;
+    if (this.done.some((job) => job.order === order && Math.abs(at - (job.at ?? -Infinity)) < SAME_MS)) return;
     const job = this.now?.product === product ? this.now : { product, order, detours: [], legs: [] };
     this.done.unshift({ ...job, at });
     this.now = null;
   }
 
-  thought(at, { kind, product, seen }) {
+  thought(at, { kind, product }) {
     const job = this.now;
     const isIts = job?.product === product;
-    if (kind === "fetching") {
-      // It is thought before or after it is told that it sets out.
-      this.far = { product, crossings: Number(seen), at };
-      if (isIts) job.crossings ??= this.far.crossings;
-    }
     if (kind === "has_goods" && isIts) {
       job.picked ??= at;
       // The way out of the goods is no leg between two crossings.
