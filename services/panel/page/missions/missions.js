@@ -163,7 +163,7 @@ export class Missions {
     if (!this.isOpen()) return;
     this.past.draw(robot, now);
     this.drawOrders(robot, now);
-    this.tiles.draw(robot);
+    this.tiles.draw(robot, !this.link.mayDrive || robot?.isStale(now));
     const { picks, picked, undo } = this.parts;
     this.plain.forEach((button, at) => {
       put(button, sentence(`do_${PLAIN[at]}`));

@@ -11,6 +11,8 @@ const RIGHT_MS = 1_500;
 /** An answer that did not come is asked for again after this time, in ms. */
 const AGAIN_MS = 10_000;
 
+const NONE = [];
+
 export class Past {
   /** `open` shows `list` with its filters and hides `rest`. */
   constructor(parts) {
@@ -21,6 +23,7 @@ export class Past {
       box.hidden = !isOpen;
       rest.hidden = isOpen;
       open.setAttribute("aria-expanded", isOpen);
+      if (isOpen) this.show();
     };
     for (const filter of [goods, time]) filter.onchange = () => this.show();
     this.jobs = [];
@@ -30,22 +33,30 @@ export class Past {
   /** The goods that can be chosen. */
   setNames(names) {
     this.names = names;
+    this.shown = null;
     const { goods } = this.parts;
     const { value } = goods;
-    goods.replaceChildren(new Option(say("past_goods"), ""), ...[...names].map(([id, name]) => new Option(name, id)));
+    const all = new Option(say("past_goods"), "");
+    all.dataset.word = "past_goods";
+    goods.replaceChildren(all, ...[...names].map(([id, name]) => new Option(name, id)));
     if (names.has(value)) goods.value = value;
   }
 
   draw(robot, now) {
-    this.jobs = robot?.jobs.done ?? [];
-    const today = this.jobs.filter(isToday).length;
+    this.jobs = robot?.jobs.done ?? NONE;
+    // The newest come first.
+    const other = this.jobs.findIndex((job) => !isToday(job));
+    const today = other < 0 ? this.jobs.length : other;
     put(this.parts.open, this.parts.box.hidden ? say("past_open", today) : say("past_close"));
     if (robot && now - robot.jobs.recalled > AGAIN_MS) recall(robot, now);
-    this.show();
+    if (!this.parts.box.hidden) this.show();
   }
 
   show() {
     const { goods, time, totals, list } = this.parts;
+    const shown = [goods.value, time.value, this.jobs.length, this.jobs[0]?.at, new Date().getDate(), document.documentElement.lang].join();
+    if (this.shown === shown && this.shownOf === this.jobs) return;
+    Object.assign(this, { shown, shownOf: this.jobs });
     const jobs = this.jobs.filter((job) => (!goods.value || job.product === goods.value) && (time.value !== "today" || isToday(job)));
     const all = this.jobs.filter((job) => !goods.value || job.product === goods.value);
     put(totals, say("past_totals", all.filter(isToday).length, all.length));

@@ -7,6 +7,9 @@ import { isText } from "../bar/stop.js";
 import { put, say } from "../words/words.js";
 import { matches } from "./reorder.js";
 
+/** So many of the goods that match are named. */
+const SOME = 3;
+
 export class Tiles {
   /** `offers` says what goods are and what a click does, `fetch` orders goods; `isOff` says whether keys are others'. */
   constructor({ form, field, tiles, said }, { offers, fetch, isOff }) {
@@ -51,7 +54,11 @@ export class Tiles {
     return this.offers({ kind: "good", id, hand: { beside: this.form, said: this.said } });
   }
 
-  draw(robot) {
+  draw(robot, isOld) {
+    const { state, queue, gone, jobs } = robot ?? {};
+    const shown = JSON.stringify([robot?.name, isOld, state?.product, state?.phase, queue, [...(gone ?? [])], jobs?.done[0]?.at, this.goods, document.documentElement.lang]);
+    if (this.shown === shown) return;
+    this.shown = shown;
     for (const [id, button] of this.buttons) {
       const { what, does, why } = this.offer(id);
       const turn = robot ? turnOf(robot, id) : -1;
@@ -81,7 +88,9 @@ export class Tiles {
     const text = field.value.trim();
     if (!text) return field.focus();
     const found = matches(this.goods, text);
-    if (found.length !== 1) return put(said, found.length ? say("search_many", found.map(title).join(", ")) : say("search_none"));
+    const some = found.slice(0, SOME).map(title).join(", ");
+    if (found.length > 1) return put(said, say("search_many", found.length > SOME ? `${some} …` : some));
+    if (!found.length) return put(said, say("search_none"));
     field.value = "";
     this.find();
     this.fetch(String(found[0].id), { beside: this.form, said });
