@@ -173,7 +173,7 @@ export class Missions {
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";
     picks.disabled = pick === undefined || !this.link.mayDrive;
-    picked.parentElement.hidden = !(pick === "manual" && robot.state.phase === "picking");
+    picked.parentElement.hidden = !(robot?.state.phase === "picking" && (pick === "manual" || robot.state.remedy !== undefined));
   }
 
   drawOrders(robot, now) {

@@ -32,7 +32,8 @@ export class Order {
     card.hidden = product === undefined;
     if (card.hidden) return;
     const job = jobOf(robot, product);
-    const isCarried = carries(robot) === product || job.picked !== undefined;
+    // A claw that has closed on nothing says that the goods are gone, too.
+    const isCarried = job.picked !== undefined || (carries(robot) === product && robot.state.phase !== "picking");
     put(number, product);
     number.classList.toggle("full", isCarried);
     put(name, goods.name || say("goods_numbered", product));
@@ -40,10 +41,10 @@ export class Order {
     const to = isCarried || !goods.square ? say("order_to") : say("order_from", goods.square.join(","));
     put(where, ms === null ? to : `${to}, ≈ ${minutes(ms)}`);
     put(time, job.began === undefined ? "" : minutes(now - job.began));
-    this.drawSteps(job, isCarried ? CARRIES : job.arrived !== undefined || robot.state.phase === "picking" ? PICKS : ARRIVES, known);
+    this.drawSteps(job, isCarried ? CARRIES : job.arrived !== undefined || robot.state.phase === "picking" ? PICKS : ARRIVES, known, now);
   }
 
-  drawSteps(job, current, known) {
+  drawSteps(job, current, known, now) {
     const guessed = known ? ends(job, known) : {};
     const isAtOnce = job.asked && job.began - job.asked.at < AT_ONCE_MS;
     this.steps.forEach((step, index) => {
@@ -53,7 +54,7 @@ export class Order {
       else step.removeAttribute("aria-current");
       const [label, time] = step.children;
       put(label, say(index === 0 && isAtOnce ? "step_asked" : word));
-      put(time, index === 0 ? began(job) : index === CARRIES ? (current === CARRIES ? say("now") : "") : since(job, key, guessed));
+      put(time, index === 0 ? began(job) : index === CARRIES ? (current === CARRIES ? say("now") : "") : since(job, key, guessed, now));
     });
   }
 }
@@ -66,9 +67,9 @@ export function jobOf(robot, product) {
 
 const began = ({ began: at }) => (at === undefined ? "" : new Date(at).toTimeString().slice(0, 8));
 
-/** How long after it set out a step was done, or will be. */
-function since({ began: from, ...job }, key, guessed) {
+/** How long after it set out a step was done, or will be; what takes longer than ever has no time. */
+function since({ began: from, ...job }, key, guessed, now) {
   if (from === undefined) return "";
   if (job[key] !== undefined) return `+${minutes(job[key] - from)}`;
-  return guessed[key] ? `≈ ${minutes(guessed[key] - from)}` : "";
+  return guessed[key] > now ? `≈ ${minutes(guessed[key] - from)}` : "";
 }
