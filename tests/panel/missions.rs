@@ -136,9 +136,7 @@ fn goods_are_found_by_number_or_name_and_a_battery_that_is_nearly_empty_is_told(
 
     // A robot that tells only a voltage has no percentage.
     assert_eq!(page.text("#battery"), "11.4 V");
-    robot.says(&[&format!(
-        "{WAITS} battery_percent=62 battery_left_s=2400"
-    )]);
+    robot.says(&[&format!("{WAITS} battery_percent=62 battery_left_s=2400")]);
     page.wait_for("#battery", "62 %, ≈ 40 min");
     assert_eq!(page.value("document.title"), "Lagerrobot");
     robot.says(&[&format!("{WAITS} battery_percent=12")]);
@@ -220,7 +218,12 @@ fn times_are_learned_from_what_was_delivered_and_rows_move_with_the_fewest_order
     // is no time for them, nor for what comes after.
     assert_eq!(
         page.value("pure.waits(56_000, ['2', '5', '6', '1'], known, true)"),
-        json!([56_000 + 5_000 + 72_000, 56_000 + 5_000 + 72_000 + 5_000 + 64_000, null, null])
+        json!([
+            56_000 + 5_000 + 72_000,
+            56_000 + 5_000 + 72_000 + 5_000 + 64_000,
+            null,
+            null
+        ])
     );
     assert_eq!(
         page.value("pure.waits(0, ['1'], pure.learn([], far), false)"),

@@ -161,7 +161,8 @@ impl Shell {
             world: opening.asking(&waiter)?,
             waiter,
             watchdog: (*watchdog).clone(),
-            conversation: Conversation::new(config.name.clone(), kept, config.link_lost).on(config.pack),
+            conversation: Conversation::new(config.name.clone(), kept, config.link_lost)
+                .on(config.pack),
             stop_word: bus.home().folder_of(bus.unit()).join(StopPage::FILE),
             health: opening.subscriber()?,
             status: opening.subscriber()?,
