@@ -6,6 +6,7 @@ mod driving;
 mod fleet;
 mod manners;
 mod map;
+mod missions;
 mod needs;
 mod pictures;
 mod played;
@@ -64,6 +65,7 @@ fn snake(name: &str) -> String {
 
 each_alone! {
     setting_up::the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys,
+    missions::orders_are_moved_by_a_pointer_and_by_keys_as_the_robot_says,
     setting_up::the_queue_is_reordered_and_what_is_taken_out_can_be_put_back,
     setting_up::how_unsure_the_place_is_grows_until_the_next_mark,
     manners::a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button,
@@ -108,7 +110,8 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     page.value("document.querySelector('#goods').value = '2'");
     page.click("#fetch button");
     wait_for("it to wait or to be under way", || {
-        page.text("#queue").contains('2').then_some(())
+        let shown = page.text("#queue") + &page.text("#order-number");
+        shown.contains('2').then_some(())
     });
     // Its drawing moves as the robot does.
     let place = "document.querySelector('#map .robot').getAttribute('transform')";

@@ -136,7 +136,8 @@ pub(crate) fn the_words_are_swedish_for_who_reads_swedish(_scene: &mut Scene, pa
     let shown = "['#products option', '#map .robot title', '#map .ghost title'].map((part) => \
                  document.querySelector(part).textContent).join()";
     assert_eq!(page.value(shown), "vänster,robot,där den verkligen är");
-    page.wait_until("/^[0-9]+,[0-9] V$/.test(document.querySelector('#battery').textContent)");
+    page.wait_until("/^[0-9]+ %/.test(document.querySelector('#battery').textContent)");
+    page.wait_until("/^[0-9]+,[0-9] V$/.test(document.querySelector('#battery').title)");
     page.wait_for("#link", " ms");
     assert_eq!(page.value("document.documentElement.lang"), "sv");
     page.wait_for("#map-text", "Ett lager med 2 gånger 2 rutor");
@@ -213,7 +214,7 @@ pub(crate) fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button(
     scene.wait_to_move();
 
     // The space bar stops in a list and on a checkbox, too; Enter ticks a checkbox.
-    for part in ["#goods", "#picks", "#load-file"] {
+    for part in ["#save-span", "#picks", "#load-file"] {
         page.click("#tab-missions");
         page.value(&format!(
             "(() => {{ const part = document.querySelector('{part}'); \

@@ -119,7 +119,7 @@ fn goods_that_were_delivered_are_fetched_again_only_when_a_person_says_that_they
     page.wait_until("document.querySelector('#missions #goods-back:not([hidden])') !== null");
     assert_eq!(orders(&mut page, 1), 0);
     page.click("#goods-back-yes");
-    page.wait_for("#queue li", "1  under way");
+    page.wait_for("#order-number", "1");
     page.wait_until("document.querySelector('#map [data-product=\"1\"].gone') === null");
     assert_eq!(orders(&mut page, 1), 1);
     drop(page);

@@ -171,7 +171,7 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
     let button = |line: usize, which: usize| {
         format!(
             "#queue .waiting:nth-of-type({}) button:nth-of-type({which})",
-            line + 2
+            line + 1
         )
     };
     let click = |page: &mut Page, selector: &str, queue: &str| {
@@ -210,11 +210,11 @@ fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     // An order can be cancelled as long as its goods are not in the claw.
     page.fill("#goods", "2");
     page.click("#fetch button");
-    page.wait_for("#queue li", "2  under way");
-    page.click("#queue li button");
-    page.wait_for("#queue li", "Nothing waits.");
+    page.wait_for("#order-number", "2");
+    page.click("#order-cancel");
+    page.wait_until("document.querySelector('#order').hidden");
     page.click("#queue-undo");
-    page.wait_for("#queue li", "2  under way");
+    page.wait_for("#order-number", "2");
     drop(page);
     scene.end();
 }
@@ -239,7 +239,7 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
         "#state",
         "There is no way from (1, 1) to where the robot must go",
     );
-    page.wait_for("#queue li", "2 nails  under way");
+    page.wait_for("#order-name", "nails");
     now("phase=driving sensor_up=0 steering_up=1");
     page.wait_for("#state", "he sensor board is not heard");
     page.click("#language");
@@ -394,7 +394,7 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     _scene: &mut Scene,
     page: &mut Page,
 ) {
-    let goods = "[...document.querySelectorAll('#goods option')].map(({ value }) => value).join()";
+    let goods = "[...document.querySelectorAll('#tiles button')].map(({ dataset }) => dataset.product).join()";
     page.wait_until(&format!("{goods} === '1,2,3'"));
 
     // In the set-up view, a click in a square places goods at the square's nearest side.

@@ -101,7 +101,7 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
 }
 
 pub(crate) fn one_press_on_fetch_is_one_order(_scene: &mut Scene, page: &mut Page) {
-    page.wait_until("document.querySelectorAll('#goods option').length > 0");
+    page.wait_until("document.querySelectorAll('#tiles button').length > 0");
     page.listen_in();
     page.value(
         "(() => { const goods = document.querySelector('#goods'); goods.value = '2'; \

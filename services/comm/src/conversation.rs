@@ -66,6 +66,7 @@ use lager_orders::{Code, Mode, Moment, Reason};
 use lager_topics::{Event, Phase, Role, WarehouseMap};
 use lager_wire::OperatorCommand;
 
+use crate::battery::{Battery, Pack};
 use crate::effect::Effect;
 use crate::known::Known;
 use crate::lost::{LinkLost, Standing};
@@ -158,6 +159,7 @@ pub struct Conversation {
     untold: VecDeque<(u64, Event)>,
     /// What only a peer with the extension is told.
     telling: Telling,
+    battery: Battery,
     /// What has happened lately.
     memory: Memory,
     /// The services of the robot, and since when each lives, from their samples' stamps.
@@ -202,6 +204,7 @@ impl Conversation {
             status_ns: 0,
             untold: VecDeque::new(),
             telling: Telling::default(),
+            battery: Battery::default(),
             memory: Memory::default(),
             lives: HashMap::new(),
             orders: Orders::default(),
@@ -209,6 +212,13 @@ impl Conversation {
             stops: Vec::new(),
             standing: Standing::new(link_lost),
         }
+    }
+
+    /// The same for a robot with this battery.
+    #[must_use]
+    pub fn on(mut self, pack: Pack) -> Self {
+        self.battery = Battery::new(pack);
+        self
     }
 
     /// Takes what is to be done, in the order of the decisions.

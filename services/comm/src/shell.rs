@@ -27,6 +27,7 @@ use lager_topics::{
 use lager_wake::{Policy, Shutdown, Waiter, Watchdog};
 
 use crate::asking::Asking;
+use crate::battery::Pack;
 use crate::conversation::Conversation;
 use crate::effect::Effect;
 use crate::known::Senses;
@@ -53,6 +54,8 @@ pub struct CommConfig {
     pub secret: Option<PathBuf>,
     /// What a lost link means in autonomous mode.
     pub link_lost: LinkLost,
+    /// Its battery.
+    pub pack: Pack,
     /// Whether to take over the map of an earlier comm.
     pub resume: bool,
 }
@@ -158,7 +161,8 @@ impl Shell {
             world: opening.asking(&waiter)?,
             waiter,
             watchdog: (*watchdog).clone(),
-            conversation: Conversation::new(config.name.clone(), kept, config.link_lost),
+            conversation: Conversation::new(config.name.clone(), kept, config.link_lost)
+                .on(config.pack),
             stop_word: bus.home().folder_of(bus.unit()).join(StopPage::FILE),
             health: opening.subscriber()?,
             status: opening.subscriber()?,

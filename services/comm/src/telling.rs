@@ -18,6 +18,7 @@ use lager_topics::{
 };
 use lager_wire::{Binary, LineBits, LineReading};
 
+use crate::battery::Battery;
 use crate::known::{Known, Senses, Stood};
 use crate::pose;
 
@@ -53,13 +54,18 @@ impl Telling {
     }
 
     /// The reports of this moment. Takes measurements out of `known`.
-    pub(crate) fn reports(&mut self, now: Moment, known: &mut Known) -> Vec<Report> {
+    pub(crate) fn reports(
+        &mut self,
+        now: Moment,
+        known: &mut Known,
+        battery: &Battery,
+    ) -> Vec<Report> {
         // A late turn does not delay the turns after it.
         self.next_ns += PERIOD;
         if self.next_ns <= now.ns {
             self.next_ns = now.ns + PERIOD;
         }
-        let mut reports = vec![Report::State(Box::new(state(now, known)))];
+        let mut reports = vec![Report::State(Box::new(state(now, known, battery)))];
         let Senses {
             truth,
             latency,
@@ -186,7 +192,7 @@ pub(crate) fn thinks(thought: &Thought) -> Report {
     }))
 }
 
-fn state(now: Moment, known: &Known) -> State {
+fn state(now: Moment, known: &Known, battery: &Battery) -> State {
     let mut state = State {
         time_ms: u64::try_from(now.robot.as_millis()).ok(),
         next: known.route.as_deref().and_then(next),
@@ -198,6 +204,11 @@ fn state(now: Moment, known: &Known) -> State {
     put_place(&mut state, known);
     put_mission(&mut state, known);
     put_boards(&mut state, known);
+    if state.battery_dv.is_some() {
+        state.battery_percent = battery.percent();
+        let left = battery.left();
+        state.battery_left_s = left.and_then(|left| u32::try_from(left.as_secs()).ok());
+    }
     state
 }
 

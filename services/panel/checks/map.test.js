@@ -135,7 +135,7 @@ test("a click fetches goods once, and nothing where it would be wrong", () => {
   const { offer, done } = offered(robot({}));
   assert.equal(offer(GOOD).what, "7 Nails, square 1,0");
   offer(GOOD).act();
-  assert.deepEqual(done, [["fetch", "7"]]);
+  assert.deepEqual(done, [["fetch", "7", undefined]]);
   const refused = [
     [null], [robot({ product: "7" })], [robot({ product: "7", phase: "driving" }, { gone: new Set(["7"]) })],
     [robot({}, { queue: [{ order: "1", product: "7" }] })], [robot({}, { heard: -Infinity })],
@@ -149,7 +149,7 @@ test("a click fetches goods once, and nothing where it would be wrong", () => {
 });
 
 test("goods that were delivered are only asked about", () => {
-  const { what, does } = offered(robot({}, { gone: new Set(["7"]), history: [{ product: "7", at: 0, took: null, detours: [] }] })).offer(GOOD);
+  const { what, does } = offered(robot({}, { gone: new Set(["7"]), jobs: { done: [{ product: "7", at: 90_000, detours: [], legs: [], order: "1" }] } })).offer(GOOD);
   assert.match(what, /delivered at/);
   assert.equal(does, "say that it is back, and fetch it");
 });

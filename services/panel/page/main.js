@@ -47,22 +47,32 @@ const bar = new Bar(link, {
   { button: at("drive-resume"), said: at("drive-resume-said") },
 ]);
 const meetWay = obstacles(link, { said: at("map-said"), undo: at("map-undo") }, robot);
+/**
+ * What goods, crossings and ways are, and what a click on one does.
+ *
+ * @param {{ robot: () => Robot | null, isPast: () => boolean }} of the robot that is shown
+ */
+const offered = (of) => offers({
+  link, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
+  fetch: (product, hand = { beside: at("map-undo"), said: at("map-said") }) => missions.fetch(product, hand),
+  goods: (square, side) => setup.place(square, side),
+  ...of,
+});
 const map = new WarehouseMap(at("map"), {
   words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words) => put(at("map-said"), words),
   tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
   hand: {
     tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: () => !at("setup").hidden,
-    offers: offers({
-      link, now, obstacle: meetWay, isPast: () => moment.isPast, robot: () => moment.shown(robot(), now())[0], isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
-      fetch: (product) => missions.fetch(product, { beside: at("map-undo"), said: at("map-said") }),
-      goods: (square, side) => setup.place(square, side),
-    }),
+    offers: offered({ isPast: () => moment.isPast, robot: () => moment.shown(robot(), now())[0] }),
   },
 });
 const missions = new Missions(link, {
-  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), plain: at("plain"), back: at("goods-back"), backSaid: at("goods-back-said"), backYes: at("goods-back-yes"), backNo: at("goods-back-no"), clear: at("clear"), undo: at("queue-undo"),
-  said: at("missions-said"), queue: at("queue"), history: at("history"),
-}, robot);
+  fetch: at("fetch"), goods: at("goods"), tiles: at("tiles"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), plain: at("plain"),
+  back: at("goods-back"), backSaid: at("goods-back-said"), backYes: at("goods-back-yes"), backNo: at("goods-back-no"), clear: at("clear"), undo: at("queue-undo"),
+  said: at("missions-said"), head: at("queue-said"), queue: at("queue"), rest: at("missions-now"),
+  order: at("order"), orderNumber: at("order-number"), orderName: at("order-name"), orderWhere: at("order-where"), orderTime: at("order-time"), orderSteps: at("order-steps"), orderCancel: at("order-cancel"),
+  past: at("past"), pastOpen: at("past-open"), pastGoods: at("past-goods"), pastTime: at("past-time"), pastTotals: at("past-totals"), history: at("history"),
+}, robot, { offers: offered({ isPast: () => false, robot }), isArmed: () => at("armed").checked, isOpen: () => !at("missions").hidden });
 const arm = new Arm(at("arm-drawing"));
 const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), resume: at("drive-resume") }, robot, now);
 const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("hand-said"), take: at("hand-now"), leave: at("hand-leave") }, robot, () => act("mode manual"), (...words) => driving.tell(...words));

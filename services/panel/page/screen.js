@@ -3,10 +3,11 @@
 
 import { at } from "./parts/at.js";
 import { named, shown } from "./station/chosen.js";
+import { battery } from "./bar/battery.js";
 import { face, show } from "./bar/face.js";
 import { Link } from "./station/link.js";
 import { Stop } from "./bar/stop.js";
-import { current, decimal, put, say } from "./words/words.js";
+import { current, put, say } from "./words/words.js";
 
 current();
 const link = new Link();
@@ -23,9 +24,8 @@ function picture() {
   wasStopped = isStopped;
   show(face(link, seen, performance.now()), seen);
   put(at("whose"), name() ?? "");
-  const { mode, battery_dv } = seen?.state ?? {};
-  const volts = battery_dv === undefined ? "" : say("volts", decimal(Number(battery_dv) / 10));
-  put(at("figures"), [mode ? say(`mode_${mode}`) : "", volts].filter(Boolean).join(" \u00b7 "));
+  const { mode } = seen?.state ?? {};
+  put(at("figures"), [mode ? say(`mode_${mode}`) : "", battery(seen?.state ?? {}).words].filter(Boolean).join(" \u00b7 "));
   requestAnimationFrame(picture);
 }
 requestAnimationFrame(picture);

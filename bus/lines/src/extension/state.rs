@@ -84,6 +84,10 @@ fields! {
         servo_errors: Binary = "a row of eight digits of 0 and 1",
         /// The battery in tenths of a volt.
         battery_dv: u8 = "a voltage from 0 to 255 tenths of a volt",
+        /// The part of its charge that is left, in percent.
+        battery_percent: u8 = "a percentage from 0 to 255",
+        /// How long that lasts until the robot stands, in s; left out unless it falls clearly.
+        battery_left_s: u32 = "a time from 0 to 4294967295 s",
         /// Whether the sensor board is heard.
         sensor_up: bool = "0 or 1",
         /// Whether the steering board is heard.

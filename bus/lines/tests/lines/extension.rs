@@ -153,6 +153,8 @@ fn the_fullest_state_fits_in_a_line() {
         loads: Some(Loads::new([-1023; 8])),
         servo_errors: Some(Binary(255)),
         battery_dv: Some(255),
+        battery_percent: Some(255),
+        battery_left_s: Some(u32::MAX),
         sensor_up: Some(true),
         steering_up: Some(true),
         sensor_lost: Some(u32::MAX),

@@ -210,11 +210,13 @@ prop_compose! {
         distance_cm in of(any::<u8>()), left_duty in of(any::<u8>()),
         right_duty in of(any::<u8>()), code in of(any::<u8>()),
         servos in of(any::<[Option<u16>; 8]>()), battery_dv in of(any::<u8>()),
+        battery_percent in of(any::<u8>()), battery_left_s in of(any::<u32>()),
         loads in of(any::<[i16; 8]>()), servo_errors in of(any::<u8>()),
     ) -> State {
         State {
             line_bits: bits.map(LineBits::new), line_error, distance_cm, left_duty, right_duty,
             code: code.map(Binary), servos: servos.map(Servos::new), battery_dv,
+            battery_percent, battery_left_s,
             loads: loads.map(Loads::new), servo_errors: servo_errors.map(Binary),
             ..work
         }

@@ -97,6 +97,7 @@ impl Conversation {
     /// The steering board has reported.
     pub fn report(&mut self, now: Moment, report: &SteeringReport) {
         self.known.report = Some(*report);
+        self.battery.read(now.robot, report.battery_decivolts);
         self.driving.reported(now.robot, report);
         // Use the board's report, which has just come.
         let stands = (report.left_duty, report.right_duty, report.age_ms) == (0, 0, 0);

@@ -52,7 +52,7 @@ impl Conversation {
     /// Tells the state as it is known now.
     pub fn tell(&mut self, now: Moment) {
         if self.is_to_tell(now) {
-            let reports = self.telling.reports(now, &mut self.known);
+            let reports = self.telling.reports(now, &mut self.known, &self.battery);
             self.effects.extend(reports.into_iter().map(Effect::Show));
         }
     }

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use lager_comm::{Conversation, Effect, LinkLost};
+use lager_comm::{Conversation, Effect, LinkLost, Pack};
 use lager_lines::conversation::RobotLine;
 use lager_lines::extension::{Hello, Report};
 use lager_lines::gag::Query;
@@ -59,7 +59,10 @@ impl Robot {
     pub(crate) fn that(mode: Mode, kept: Option<WarehouseMap>, link_lost: LinkLost) -> Self {
         let name = Name::new("r1").expect("a name");
         let mut robot = Self {
-            conversation: Conversation::new(name, kept, link_lost),
+            conversation: Conversation::new(name, kept, link_lost).on(Pack {
+                cells: 3,
+                low_decivolts: 100,
+            }),
             now: Moment {
                 robot: Duration::from_secs(1),
                 ns: 1_000_000_000,

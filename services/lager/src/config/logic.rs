@@ -23,6 +23,8 @@ const TURNS_DEG_PER_S: RangeInclusive<f32> = 5.0..=180.0;
 const TAPES_MM: RangeInclusive<f32> = 5.0..=50.0;
 /// The same for the ranger's place.
 const RANGERS_AHEAD_MM: RangeInclusive<f32> = 0.0..=400.0;
+/// The board measures up to 20 V, and five full cells have 21 V.
+const MOST_CELLS: u8 = 4;
 
 section! {
     "logic"
@@ -41,6 +43,10 @@ section! {
         /// Battery in tenths of a volt. Below this the robot stands at the next crossing until the
         /// battery is charged or a person has put the robot down again. 0 = never.
         pub low_battery_decivolts: u8 = LogicConfig::default().low_battery_decivolts,
+        /// How many lithium cells in series the battery has, from 1 to 4. From that and its voltage
+        /// the robot tells its charge in percent. 0 = the battery is another one, and the robot
+        /// tells only its voltage.
+        pub battery_cells: u8 = 3,
         /// How far the ranger at the front sees, in cm: from 11 to 255. 0 = there is no ranger, and
         /// the robot looks along no way. A thing blocks a way if it is at least 10 cm nearer than
         /// this distance and than the next crossing.
@@ -78,6 +84,12 @@ impl LogicSection {
                     range.end()
                 );
             }
+        }
+        if self.battery_cells > MOST_CELLS {
+            bail!(
+                "[logic] battery_cells is {}; it must be from 1 to {MOST_CELLS}, as the board measures up to 20 V, or 0 where the battery has no lithium cells",
+                self.battery_cells
+            );
         }
         for (key, value) in [
             ("reach_shoulder", self.reach_shoulder),

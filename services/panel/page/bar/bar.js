@@ -6,11 +6,12 @@
 /** @import { Held } from "./resume.js" */
 
 import { named } from "../station/chosen.js";
+import { battery } from "./battery.js";
 import { age, causeOf, face, show } from "./face.js";
 import { called, sentence } from "../words/sentences.js";
 import { Resume } from "./resume.js";
 import { Stop } from "./stop.js";
-import { decimal, put, say } from "../words/words.js";
+import { put, say } from "../words/words.js";
 
 export class Bar {
   /**
@@ -49,12 +50,13 @@ export class Bar {
     const state = face(this.link, robot, now);
     show(state, robot);
     put(parts.link, this.linkWords(robot, now));
-    const { mode, battery_dv: decivolts, hold, stopped } = robot?.state ?? {};
+    const { mode, stopped } = robot?.state ?? {};
     put(parts.mode, stopped === "1" ? say("stopped_short") : mode ? say(`mode_${mode}`) : "");
     put(parts.driver, this.driverWords(robot));
-    const volts = decivolts === undefined ? "" : decimal(Number(decivolts) / 10);
-    parts.battery.classList.toggle("low", hold === "battery");
-    put(parts.battery, volts && say(hold === "battery" ? "battery_low" : "volts", volts));
+    const { words, volts, isLow } = battery(robot?.state ?? {});
+    parts.battery.classList.toggle("low", isLow);
+    put(parts.battery, words);
+    if (parts.battery.title !== volts) parts.battery.title = volts;
     this.drawStop(robot);
     this.tell(state, robot);
     return state;

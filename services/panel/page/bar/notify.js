@@ -5,6 +5,8 @@
 /** @import { Robot } from "../station/robot.js" */
 /** @import { Face, Look } from "./face.js" */
 
+import { say } from "../words/words.js";
+import { battery } from "./battery.js";
 import { face } from "./face.js";
 
 /**
@@ -31,7 +33,7 @@ export class Notify {
     /** @type {AudioContext | null} */
     this.audio = null;
     /**
-     * Since when each robot has needed somebody, by its name, and whether that has been told.
+     * Since when each robot has needed somebody, by its name and whether to charge it, and whether that has been told.
      *
      * @type {Map<string, { since: number, isTold: boolean }>}
      */
@@ -57,13 +59,15 @@ export class Notify {
   /** @param {number} now */
   draw(now) {
     const all = [...this.link.robots.values()].map((robot) => ({ robot, ...face(this.link, robot, now) }));
-    const needy = all.filter(isNeedy);
+    /** @type {Need[]} */
+    const needy = all.flatMap((one) => (isNeedy(one) ? one : (alarm(one.robot, now) ?? [])));
     const title = needy.map(({ robot, said }) => `${robot.name}: ${said}`).join("; ");
     document.title = title ? `! ${title}` : this.title;
     const before = this.needing;
-    this.needing = new Map(needy.map(({ robot: { name } }) => [name, before.get(name) ?? { since: now, isTold: false }]));
-    for (const { robot, said, more } of needy) {
-      const need = this.needing.get(robot.name);
+    this.needing = new Map(needy.map((one) => [key(one), before.get(key(one)) ?? { since: now, isTold: false }]));
+    for (const one of needy) {
+      const { robot, said, more } = one;
+      const need = this.needing.get(key(one));
       if (!need || need.isTold || now - need.since < PASSES_MS) continue;
       need.isTold = true;
       if (this.box.checked) this.tell(robot.name, [said, more].filter(Boolean).join(". "));
@@ -91,6 +95,27 @@ export class Notify {
     tone.start();
     tone.stop(this.audio.currentTime + LENGTH);
   }
+}
+
+/** @typedef {{ robot: Robot, look: Look | "charge", said?: string | null, more?: string | null }} Need */
+
+/**
+ * Of one robot, to charge it is told apart from all else.
+ *
+ * @param {Need} need
+ */
+const key = ({ robot: { name }, look }) => `${name} ${look === "charge"}`;
+
+/**
+ * The battery of a robot that still goes is nearly empty.
+ *
+ * @param {Robot} robot
+ * @param {number} now
+ * @returns {Need | null}
+ */
+function alarm(robot, now) {
+  const { words, isLow } = battery(robot.state);
+  return isLow && !robot.isStale(now) ? { robot, look: "charge", said: say("battery_alarm", words) } : null;
 }
 
 /**

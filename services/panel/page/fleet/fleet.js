@@ -4,9 +4,10 @@
 /** @import { Robot } from "../station/robot.js" */
 /** @import { Face } from "../bar/face.js" */
 
+import { battery } from "../bar/battery.js";
 import { face, SHAPES } from "../bar/face.js";
 import { make } from "../parts/svg.js";
-import { decimal, put, say } from "../words/words.js";
+import { put, say } from "../words/words.js";
 
 /** The looks, the gravest first. */
 const GRAVITY = Object.keys(SHAPES);
@@ -80,7 +81,6 @@ export class Fleet {
  *
  * @param {Robot} robot
  */
-function figures({ state: { battery_dv: decivolts }, queue }) {
-  const volts = decivolts === undefined ? "" : say("volts", decimal(Number(decivolts) / 10));
-  return [volts, queue.length ? say("orders_wait", queue.length) : ""];
+function figures({ state, queue }) {
+  return [battery(state).words, queue.length ? say("orders_wait", queue.length) : ""];
 }

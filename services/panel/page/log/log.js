@@ -2,7 +2,7 @@
 // time line and in the strips.
 
 import { KINDS, kindOf, placeOf, told } from "./kinds.js";
-import { item } from "../missions/missions.js";
+import { item } from "../parts/list.js";
 import { crossing } from "../words/sentences.js";
 import { clock, current, put, say } from "../words/words.js";
 import { make } from "../parts/svg.js";

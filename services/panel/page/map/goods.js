@@ -162,7 +162,7 @@ export class Goods {
     for (const { id, box, turn, turnNumber, why } of this.parcels) {
       const order = turnOf(robot, id);
       const [isWanted, isQueued, isGone] = [order === 0, order > 0, robot.gone.has(id)];
-      const isOutOfReach = isWanted ? noWay : isQueued && robot.unreachable.has(id);
+      const isOutOfReach = isWanted ? noWay : isQueued && robot.jobs.putOff.get(id) === "order_put_off";
       const words = ["good", isWanted && "wanted", isQueued && "queued", isGone && "gone", isOutOfReach && "out-of-reach"];
       set(box, "class", words.filter(Boolean).join(" "));
       turn.toggleAttribute("hidden", !isQueued || !this.hasNumbers);
@@ -203,9 +203,9 @@ function shared(size, side, px) {
 /**
  * The robot's last delivery of goods that are not in their place, if it has told one.
  *
- * @param {Pick<Robot, "history">} robot
+ * @param {Pick<Robot, "jobs">} robot
  * @param {string} product
  */
 export function wasDelivered(robot, product) {
-  return robot.history.find((one) => one.product === product) ?? null;
+  return robot.jobs.done.find((one) => one.product === product) ?? null;
 }

@@ -16,27 +16,31 @@ import { clock, say } from "../words/words.js";
  * @typedef {{ what?: string, does?: string | undefined, why?: string | undefined, act?: (() => unknown) | undefined }} Offer
  */
 
+/** @typedef {{ beside: Element, said: HTMLElement }} Hand Where a person is asked and told. */
+/** @typedef {{ kind: "good", id: string, hand: Hand }} Tile Goods that stand in a list. */
+
 /**
  * @param {object} page
  * @param {Pick<Link, "warehouse" | "mayDrive">} page.link
  * @param {() => Robot | null} page.robot
- * @param {(product: string) => unknown} page.fetch orders goods, or asks whether they are back
+ * @param {(product: string, hand?: Hand) => unknown} page.fetch orders goods, or asks whether they are back
  * @param {(crossing: string[]) => unknown} page.stands says where the robot stands
  * @param {() => boolean} page.isPlaceWanted whether that is to be said
  * @param {(way: string) => unknown} page.obstacle puts an obstacle there or takes it away
  * @param {(square: Point, side: Side) => unknown} page.goods puts goods at the side of a square
  * @param {() => number} page.now
  * @param {() => boolean} page.isPast whether the map shows the past; `robot` is the past one then
- * @returns {(target: Target | null) => Offer}
+ * @returns {(target: Target | Tile | null) => Offer}
  */
 export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now, isPast }) {
   /**
    * Goods are fetched; those that are not in their place, after a question.
    *
    * @param {string} id
+   * @param {Hand} [hand] where a person is asked, if not on the map
    * @returns {Offer}
    */
-  function good(id) {
+  function good(id, hand) {
     const { name, square = [] } = link.warehouse?.product?.find((product) => String(product.id) === id) ?? {};
     const what = say("tip_good", name ? `${id} ${name}` : id, square.join(","));
     const shown = robot();
@@ -46,10 +50,10 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
     if (turn === 0) return { what, why: say("is_fetched") };
     if (turn > 0) return { what, why: say("waits_as", turn) };
     const why = cannot(shown);
-    const act = why ? undefined : () => fetch(id);
+    const act = why ? undefined : () => fetch(id, hand);
     if (shown.gone.has(id)) {
       const delivery = wasDelivered(shown, id);
-      const was = delivery ? say("delivered_at", clock(delivery.at)) : say("away");
+      const was = delivery?.at !== undefined ? say("delivered_at", clock(delivery.at)) : say("away");
       return { what: `${what}, ${was}`, does: why ? undefined : say("does_ask_back"), why, act };
     }
     const after = shown.queue.filter(({ order }) => order !== shown.state.order).length;
@@ -108,13 +112,14 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
   /**
    * What a thing is, what a click does, or why a click does nothing.
    *
-   * @param {Target | null} target
+   * @param {Target | Tile | null} target
    * @returns {Offer}
    */
   function offer(target) {
     if (!target) return { why: say("nothing_here") };
     if (target.kind === "square") return place(target);
-    return { good, crossing: node, way }[target.kind](target.id);
+    if (target.kind === "good") return good(target.id, "hand" in target ? target.hand : undefined);
+    return target.kind === "crossing" ? node(target.id) : way(target.id);
   }
 
   // While the map shows the past, nothing on it is ordered.

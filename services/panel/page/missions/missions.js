@@ -1,30 +1,39 @@
-// What is fetched: the queue, what the hands at the goods say, what has been delivered.
+// What is fetched: the order under way, the queue, all goods, what the hands at the goods say, what was delivered.
 
 import { turnOf, wasDelivered } from "../map/goods.js";
-import { PLAIN, crossing, reason, sentence } from "../words/sentences.js";
-import { clock, put, say, span } from "../words/words.js";
+import { PLAIN, reason, sentence } from "../words/sentences.js";
+import { clock, put, say } from "../words/words.js";
+import { crossingsTo, learn, left, waits } from "./legs.js";
+import { Order, jobOf } from "./order.js";
+import { Past } from "./past.js";
+import { Queue } from "./queue.js";
+import { ups } from "./reorder.js";
+import { Tiles } from "./tiles.js";
 
 /** Whoever orders the same goods again within this time has clicked twice, or holds Enter. */
 const TWICE_MS = 700;
 
 export class Missions {
-  constructor(link, parts, robot) {
-    this.link = link;
-    this.parts = parts;
-    this.robot = robot;
-    this.shown = null;
-    /** Number and name of goods, by number. */
+  /** `isArmed` says whether the arrows drive, `isOpen` whether this view is seen; `offers` as on the map. */
+  constructor(link, parts, robot, { offers, isArmed, isOpen }) {
+    Object.assign(this, { link, parts, robot, isOpen });
+    /** Goods of the warehouse, and number and name of each, by their number. */
+    this.goods = new Map();
     this.names = new Map();
-    this.order = Date.now() % 1_000_000_000;
+    this.number = Date.now() % 1_000_000_000;
     /** What was ordered last, of which robot and when; one press is one order. */
     this.ordered = { at: -Infinity };
     /** What was taken out of a robot's queue last: its products, and how many waited behind. */
     this.taken = null;
-    parts.fetch.addEventListener("submit", (event) => {
-      event.preventDefault();
-      if (!parts.goods.value) return put(parts.said, say("no_map"));
-      this.fetch(parts.goods.value);
+    /** What past orders teach, and from which. */
+    this.learned = {};
+    this.order = new Order({ card: parts.order, number: parts.orderNumber, name: parts.orderName, where: parts.orderWhere, time: parts.orderTime, steps: parts.orderSteps });
+    this.queue = new Queue(parts.queue, { isArmed, move: (...where) => this.move(...where), cancel: (order) => this.cancel(order) });
+    this.tiles = new Tiles({ form: parts.fetch, field: parts.goods, tiles: parts.tiles, said: parts.said }, {
+      offers, isOff: () => isArmed() || !isOpen(), fetch: (product, hand) => this.fetch(product, hand),
     });
+    this.past = new Past(link, { open: parts.pastOpen, box: parts.past, rest: parts.rest, goods: parts.pastGoods, time: parts.pastTime, totals: parts.pastTotals, list: parts.history });
+    parts.orderCancel.onclick = () => this.cancel(this.robot()?.state.order);
     // It shows what the robot says, not what was wished.
     parts.picks.onclick = (event) => {
       event.preventDefault();
@@ -68,7 +77,7 @@ export class Missions {
     }
     const order = { robot, product, at, waits: true };
     this.ordered = order;
-    await this.act(`order ${++this.order} ${product}`, robot, said);
+    await this.act(`order ${++this.number} ${product}`, robot, said);
     order.waits = false;
   }
 
@@ -100,6 +109,26 @@ export class Missions {
     await this.fetch(product, { beside, said });
   }
 
+  /** Takes an order out, be it under way or waiting. */
+  cancel(order) {
+    const robot = this.robot();
+    if (!robot || order === undefined) return;
+    const orders = waiting(robot);
+    const at = orders.findIndex((one) => one.order === order);
+    // Ordered anew, what was under way comes before all that wait but the first, which is under way by then.
+    const behind = at < 0 ? Math.max(0, orders.length - 1) : orders.length - 1 - at;
+    const product = at < 0 ? robot.state.product : orders[at].product;
+    this.takeBack(`cancel ${order}`, [{ order, product }], behind);
+  }
+
+  /** Puts an order before another one, or with null at the end. Where it then stands the robot says. */
+  async move(order, before) {
+    const robot = this.robot();
+    for (const one of ups(waiting(robot).map((one) => one.order), order, before)) {
+      if (!(await this.act(`up ${one}`, robot))) return;
+    }
+  }
+
   /** Takes orders out of the queue; `gone` are those, `behind` those that wait behind them. */
   async takeBack(action, gone, behind = 0) {
     const robot = this.robot();
@@ -112,23 +141,30 @@ export class Missions {
     const { robot, products, behind } = this.taken;
     this.taken = null;
     for (const product of products) {
-      const order = ++this.order;
+      const order = ++this.number;
       if (!(await this.act(`order ${order} ${product}`, robot))) return;
       for (let step = 0; step < behind; step++) await this.act(`up ${order}`, robot);
     }
   }
 
   setWarehouse(warehouse) {
-    const { goods } = this.parts;
-    this.names = new Map((warehouse?.product ?? []).map(({ id, name = "" }) => [String(id), `${id} ${name}`.trim()]));
-    goods.replaceChildren(...(warehouse?.product ?? []).map(({ id, name }) => new Option(name ? `${id} ${name}` : id, id)));
+    this.warehouse = warehouse;
+    this.learned = {};
+    const goods = warehouse?.product ?? [];
+    this.goods = new Map(goods.map((one) => [String(one.id), one]));
+    this.names = new Map(goods.map(({ id, name = "" }) => [String(id), `${id} ${name}`.trim()]));
+    this.tiles.setGoods(goods);
+    this.past.setNames(this.names);
   }
 
   draw(robot, now) {
     // Another robot, or the goods are back: the question is over.
     if (this.asked && (robot !== this.asked.robot || !robot.gone.has(this.asked.product))) this.leave();
-    this.drawQueue(robot);
-    const { picks, undo } = this.parts;
+    if (!this.isOpen()) return;
+    this.past.draw(robot, now);
+    this.drawOrders(robot, now);
+    this.tiles.draw(robot, !this.link.mayDrive || robot?.isStale(now));
+    const { picks, picked, undo } = this.parts;
     this.plain.forEach((button, at) => {
       put(button, sentence(`do_${PLAIN[at]}`));
       button.disabled = !this.link.mayDrive;
@@ -137,78 +173,45 @@ export class Missions {
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";
     picks.disabled = pick === undefined || !this.link.mayDrive;
-    const lines = (robot?.history ?? []).map((one) => delivered(one, this.names));
-    if (!lines.length) lines.push(say("history_empty"));
-    fill(this.parts.history, lines, (line) => item(line));
+    picked.parentElement.hidden = !(robot?.state.phase === "picking" && (pick === "manual" || robot.state.remedy !== undefined));
   }
 
-  drawQueue(robot) {
-    const { queue } = this.parts;
-    const { product: current, order: number } = robot?.state ?? {};
+  drawOrders(robot, now) {
+    const { head, clear } = this.parts;
     const orders = waiting(robot);
-    const shown = JSON.stringify([robot?.name, current, number, orders, [...this.names], document.documentElement.lang]);
-    if (this.shown === shown) return;
-    this.shown = shown;
-    queue.replaceChildren();
-    const cancel = (order, product, behind) =>
-      button(say("cancel"), say("cancel_order", product), () => this.takeBack(`cancel ${order}`, [{ order, product }], behind));
-    if (current !== undefined) {
-      const line = item(`${this.names.get(current) ?? current}  ${say("under_way")}`);
-      // Ordered anew it comes before all that wait but the first, which is under way by then.
-      if (number !== undefined) line.append(cancel(number, current, Math.max(0, orders.length - 1)));
-      queue.append(line);
+    const { product, mode, stopped } = robot?.state ?? {};
+    const [known, time] = [robot && this.known(robot.jobs.done), this.link.now()];
+    const isGoing = robot && !robot.isStale(now) && mode === "autonomous" && stopped !== "1";
+    this.order.draw(robot, product, this.goods.get(product) ?? {}, isGoing ? known : null, time);
+    const first = !isGoing ? null : product === undefined ? 0 : left(jobOf(robot, product), known, time);
+    const isAway = product !== undefined || robot?.state.phase === "returning";
+    const ms = isGoing ? waits(first, orders.map(({ product }) => product), known, isAway) : [];
+    const rows = orders.map(({ order, product }, at) => ({
+      order, product, ms: ms[at] ?? null,
+      name: this.goods.get(product)?.name || say("goods_numbered", product),
+      who: robot.jobs.asked.get(order)?.who,
+      putOff: robot.jobs.putOff.get(product),
+    }));
+    this.queue.draw(rows, this.link.me, this.link.mayDrive);
+    put(head, orders.length ? say("queue_head", orders.length, this.goods.size) : say("queue_empty"));
+    clear.disabled = !orders.length || !this.link.mayDrive;
+    this.parts.orderCancel.hidden = robot?.state.order === undefined || !this.link.mayDrive;
+    const label = say("cancel_order", product ?? "");
+    if (this.parts.orderCancel.title !== label) Object.assign(this.parts.orderCancel, { title: label, ariaLabel: label });
+  }
+
+  /** What past orders teach; it is learned anew when another one is delivered. */
+  known(done) {
+    const { done: before, count, after } = this.learned;
+    const last = done[0]?.next ?? done[0]?.back;
+    if (before !== done || count !== done.length || after !== last) {
+      this.learned = { done, count: done.length, after: last, known: learn(done, (product) => crossingsTo(this.warehouse, product)) };
     }
-    orders.forEach(({ order, product }, index) => {
-      const line = item(this.names.get(product) ?? product);
-      line.className = "waiting";
-      const after = orders[index + 1];
-      const [up, down] = [
-        button("\u2191", say("move_up", product), () => this.act(`up ${order}`)),
-        button("\u2193", say("move_down", product), () => this.act(`up ${after.order}`)),
-      ];
-      [up.disabled, down.disabled] = [index === 0, !after];
-      line.append(up, down, cancel(order, product, orders.length - 1 - index));
-      queue.append(line);
-    });
-    if (!queue.children.length) queue.append(item(say("queue_empty")));
+    return this.learned.known;
   }
 }
 
 /** The orders that wait; the one under way may be listed with them. */
 function waiting(robot) {
   return (robot?.queue ?? []).filter(({ order }) => order !== robot.state.order);
-}
-
-/** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
-function delivered({ product, at, took, detours }, names) {
-  const name = names.get(product) ?? product;
-  const words = [clock(at), took ? say("took", name, span(took)) : name];
-  const ways = detours.map(({ node, looks }) => `${crossing(node)} ${sentence(`looks_${looks}`) ?? ""}`.trim());
-  if (ways.length) words.push(say("detours", ways.join("; ")));
-  return words.join("  ");
-}
-
-/** An item of a list. */
-export function item(text) {
-  const element = document.createElement("li");
-  element.append(text);
-  return element;
-}
-
-/** Fills a list, if it has changed. */
-export function fill(list, lines, make) {
-  const shown = lines.join("\n");
-  if (list.dataset.shown === shown) return;
-  list.dataset.shown = shown;
-  list.replaceChildren(...lines.map(make));
-}
-
-function button(text, label, act) {
-  const element = document.createElement("button");
-  element.type = "button";
-  element.textContent = text;
-  element.title = label;
-  element.setAttribute("aria-label", label);
-  element.onclick = act;
-  return element;
 }

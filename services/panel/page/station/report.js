@@ -74,8 +74,7 @@ const NOW = {
  */
 export function report(robot, word, rest, now, at) {
   if (Object.hasOwn(NOW, word)) return NOW[word]?.(robot, rest, now, at);
-  const entry = note(robot, word, rest, at);
-  if (entry) follow(robot, entry);
+  note(robot, word, rest, at);
 }
 
 /**
@@ -97,26 +96,4 @@ export function note(robot, word, rest, at) {
   robot.thinks = null;
   robot.happened(entry);
   return entry;
-}
-
-/**
- * Follows a robot's orders: when goods were fetched and delivered, what was in the way, what cannot be reached.
- *
- * @param {Robot} robot
- * @param {Entry} entry
- */
-function follow(robot, { kind, words, values, at }) {
-  if (kind === "event") {
-    const [what, x, y, , product = "", looks] = words;
-    if (what === "way_blocked") robot.detours.push({ node: `${x},${y}`, looks });
-    if (what === "getting_item") Object.assign(robot, { began: at, detours: [] });
-    if (what !== "item_delivered") return;
-    robot.history.unshift({ product, at, took: robot.began && at - robot.began, detours: robot.detours });
-    robot.detours = [];
-  } else if (kind === "thought") {
-    const { kind: thinks, product = "" } = values ?? {};
-    if (thinks === "order_put_off") robot.unreachable.add(product);
-    if (thinks === "fetching" || thinks === "order_cancelled") robot.unreachable.delete(product);
-    if (thinks === "queue_cleared") robot.unreachable.clear();
-  }
 }

@@ -1,5 +1,6 @@
 // What is known of one robot. Views draw this, and change none of it.
 
+import { Jobs } from "./jobs.js";
 import { Frames } from "./quantile.js";
 
 /** @typedef {"left" | "up" | "right" | "down"} Side */
@@ -31,8 +32,6 @@ import { Frames } from "./quantile.js";
  *
  * @typedef {{ at: number, kind: "event" | "thought" | "asked" | "refused", words: string[], values: Fields | null }} Entry
  */
-/** @typedef {{ node: string, looks: string | undefined }} Detour A way that was found blocked. */
-/** @typedef {{ product: string, at: number, took: number | null, detours: Detour[] }} Delivery `took` is in ms. */
 /** @typedef {{ order: string, product: string }} Order */
 /** @typedef {{ reading: number, lowest: number, highest: number, both: boolean }} Sensor */
 /**
@@ -135,40 +134,14 @@ export class Robot {
      * @type {Fields | null}
      */
     this.thinks = null;
-    /**
-     * What it has delivered, the last one first.
-     *
-     * @type {Delivery[]}
-     */
-    this.history = [];
-    /**
-     * When it set out on this order.
-     *
-     * @type {number | null}
-     */
-    this.began = null;
-    /**
-     * The ways that were found blocked on it.
-     *
-     * @type {Detour[]}
-     */
-    this.detours = [];
-    /**
-     * Goods that wait because no way leads to them.
-     *
-     * @type {Set<string>}
-     */
-    this.unreachable = new Set();
+    this.jobs = new Jobs();
   }
 
   /** Nothing has happened yet. */
   forget() {
     this.events = [];
     this.thinks = null;
-    this.history = [];
-    this.began = null;
-    this.detours = [];
-    this.unreachable = new Set();
+    this.jobs = new Jobs();
   }
 
   /**
@@ -177,6 +150,7 @@ export class Robot {
    * @param {Entry} entry
    */
   happened(entry) {
+    this.jobs.take(entry);
     const after = this.events.findLastIndex(({ at }) => at <= entry.at);
     this.events.splice(after + 1, 0, entry);
     if (this.events.length > ENTRIES) this.events.shift();

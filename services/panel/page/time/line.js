@@ -22,6 +22,8 @@ const MARKS = {
   help: (x) => `M${x} 4.5l5.5 9h-11z`,
   stop: (x) => `M${x - 2} 4h4l3 3v4l-3 3h-4l-3-3v-4z`,
 };
+/** Their looks. */
+const CLASSES = { goods: "mark-goods", help: "mark-help", stop: "mark-stop" };
 /** The line's ends are so far inside, in pixels, so that no mark is cut. */
 const INSET = 7;
 /** Two events within this time are one step, in ms. */
@@ -43,7 +45,7 @@ export class TimeLine {
     choice.replaceChildren(...SPANS_MS.map((ms) => new Option(span(ms), ms)));
     this.svg = make("svg", { "aria-hidden": "true", height: HEIGHT }, slider);
     this.ticks = make("path", { class: "ticks" }, this.svg);
-    this.marks = Object.fromEntries(Object.keys(MARKS).map((kind) => [kind, make("path", { class: `mark-${kind}` }, this.svg)]));
+    this.marks = Object.fromEntries(Object.keys(MARKS).map((kind) => [kind, make("path", { class: CLASSES[kind] }, this.svg)]));
     this.handle = make("rect", { class: "handle", y: 14, width: 6, height: 16, rx: 2 }, this.svg);
     this.width = 0;
     /** Whether the station keeps a history, as far as is known. */

@@ -41,7 +41,7 @@ function robotOf(live, told, at, ahead) {
   if (now - robot.stated < HEARD_MS) robot.stated = now;
   robot.heard = robot.stated;
   robot.events = live.events.filter((entry) => entry.at <= at);
-  robot.history = live.history.filter((delivery) => delivery.at <= at);
+  for (const entry of robot.events) robot.jobs.take(entry);
   return robot;
 }
 

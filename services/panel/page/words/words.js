@@ -38,7 +38,7 @@ const WORDS = {
     move_up: "fetch {0} earlier", move_down: "fetch {0} later", cancel_order: "do not fetch {0}",
     real_floor: "put obstacles on a real floor by hand", text_size: "A warehouse of {0} by {1} squares. Goods: {2}.", text_robot: "The robot is at {0} and looks {1}.",
     took: "{0} in {1}", thinks: "“{0}”", notify: "Tell me by a message and a sound when a robot needs me", text_lost: "It is not known where the robot is.", text_next: "It goes to {0}.", text_blocked: "Blocked ways: {0}.", column: "column", row: "row", looks: "looks",
-    where_asked: "Where does the robot stand?", on_crossing: "On this crossing:", stands_there: "It stands there", later: "Later", ghost: "where it really is", drives: "drives", volts: "{0} V", battery_low: "{0} V, low",
+    where_asked: "Where does the robot stand?", on_crossing: "On this crossing:", stands_there: "It stands there", later: "Later", ghost: "where it really is", drives: "drives", volts: "{0} V", battery_low: "{0}, low",
     by_comm: "the station", by_operator: "a command in a terminal",
     did_stop: "{0} stops it", did_resume: "{0} releases the stop", did_mode: "{0} makes it {1}", did_take: "{0} takes the wheel", did_free: "{0} leaves the wheel", did_order: "{0} orders {1}", did_cancel: "{0} cancels order {1}",
     did_first: "{0} puts order {1} first", did_up: "{0} moves order {1} up", did_clear: "{0} clears the queue", did_reset: "{0} says that it stands at the delivery", did_place: "{0} says that it stands at {1}", did_pick_auto: "{0} lets the robot pick goods up by itself", did_pick_manual: "{0} has a person pick goods up",
@@ -69,6 +69,11 @@ const WORDS = {
     log_all: "All", log_stop: "stop", log_help: "help", log_goods: "goods", log_ways: "way", log_persons: "person", log_link: "link", log_battery: "battery", log_settings: "settings",
     log_kinds: "which kinds are shown", log_earlier: "Earlier", log_no_earlier: "The station has kept nothing from before that.",
     did_ask: "{0} asks for the wheel", did_keep: "{0} keeps the wheel", did_warehouse: "{0} describes the warehouse anew",
+    step_begun: "set out", step_asked: "ordered", step_arrived: "arrived", step_picked: "picked", step_carried: "carried", now: "now", order_to: "to delivery", order_from: "from square {0} to delivery", goods_numbered: "goods {0}",
+    queue_head: "Next: {0} of {1} goods", queue: "orders that wait: drag a row, or press Alt with an arrow on it; Delete takes it out", turn: "number {0} of {1}", by: "by {0}", put_off_way: "put off: no way there", put_off_battery: "put off: battery low",
+    search: "Fetch: number or name", search_none: "no goods are called so", search_one: "Enter fetches {0}", search_many: "several goods match: {0}",
+    in_minutes: "{0} min", battery_alarm: "The battery is nearly empty: {0}",
+    past_open: "{0} delivered today", past_close: "Back to the orders", past_goods: "all goods", past_time: "since when", past_day: "the last 24 hours", past_today: "today", past_totals: "Delivered: {0} today, {1} in the last 24 hours",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -104,7 +109,7 @@ const WORDS = {
     real_floor: "ställ ut hinder för hand på ett riktigt golv", text_size: "Ett lager med {0} gånger {1} rutor. Varor: {2}.",
     text_robot: "Roboten är vid {0} och tittar {1}.", took: "{0} på {1}", thinks: "”{0}”", notify: "Säg till med meddelande och ljud när en robot behöver mig", text_lost: "Det är okänt var roboten är.", text_next: "Den kör till {0}.", text_blocked: "Spärrade vägar: {0}.",
     column: "kolumn", row: "rad", looks: "tittar", where_asked: "Var står roboten?", on_crossing: "I den här korsningen:", stands_there: "Där står den", later: "Senare",
-    ghost: "där den verkligen är", drives: "kör", volts: "{0} V", battery_low: "{0} V, lågt",
+    ghost: "där den verkligen är", drives: "kör", volts: "{0} V", battery_low: "{0}, lågt",
     by_comm: "stationen", by_operator: "ett kommando i en terminal",
     did_stop: "{0} stoppar den", did_resume: "{0} häver stoppet", did_mode: "{0} gör den {1}", did_take: "{0} tar ratten", did_free: "{0} lämnar ratten", did_order: "{0} beställer {1}", did_cancel: "{0} tar bort order {1}",
     did_first: "{0} lägger order {1} först", did_up: "{0} flyttar upp order {1}", did_clear: "{0} tömmer kön", did_reset: "{0} säger att den står vid leveransen", did_place: "{0} säger att den står vid {1}", did_pick_auto: "{0} låter roboten plocka upp varor själv", did_pick_manual: "{0} låter en människa plocka upp varor",
@@ -135,6 +140,11 @@ const WORDS = {
     log_all: "Allt", log_stop: "stopp", log_help: "hjälp", log_goods: "varor", log_ways: "väg", log_persons: "person", log_link: "länk", log_battery: "batteri", log_settings: "inställning",
     log_kinds: "vilka slag som visas", log_earlier: "Tidigare", log_no_earlier: "Stationen har inte sparat något från tiden före det.",
     did_ask: "{0} ber om ratten", did_keep: "{0} behåller ratten", did_warehouse: "{0} beskriver lagret på nytt",
+    step_begun: "ivägkörd", step_asked: "beställd", step_arrived: "framme", step_picked: "plockad", step_carried: "bärs", now: "nu", order_to: "till leveransen", order_from: "från ruta {0} till leveransen", goods_numbered: "vara {0}",
+    queue_head: "Näst: {0} av {1} varor", queue: "order som väntar: dra en rad, eller tryck Alt och en pil på den; Delete tar bort den", turn: "nummer {0} av {1}", by: "av {0}", put_off_way: "uppskjuten: ingen väg dit", put_off_battery: "uppskjuten: svagt batteri",
+    search: "Hämta: nummer eller namn", search_none: "ingen vara heter så", search_one: "Enter hämtar {0}", search_many: "flera varor passar: {0}",
+    in_minutes: "{0} min", battery_alarm: "Batteriet är nästan tomt: {0}",
+    past_open: "{0} levererade i dag", past_close: "Tillbaka till ordrarna", past_goods: "alla varor", past_time: "sedan när", past_day: "de senaste 24 timmarna", past_today: "i dag", past_totals: "Levererat: {0} i dag, {1} de senaste 24 timmarna",
   },
 };
 
@@ -210,6 +220,19 @@ export function span(ms) {
   if (ms < 60_000) return `${decimal(ms / 1_000)} s`;
   if (ms < 3_600_000) return `${Math.floor(ms / 60_000)} min`;
   return `${Math.floor(ms / 3_600_000)} h`;
+}
+
+/**
+ * A time in ms as minutes and seconds, such as 1:05, or as seconds below a minute.
+ *
+ * @param {number} ms
+ */
+export function minutes(ms) {
+  const all = Math.max(0, Math.round(ms / 1_000));
+  const [hours, rest, seconds] = [Math.floor(all / 3_600), Math.floor((all % 3_600) / 60), all % 60];
+  if (all < 60) return `${seconds} s`;
+  const two = [rest, seconds].map((part) => String(part).padStart(2, "0"));
+  return hours ? `${hours}:${two.join(":")}` : `${rest}:${two[1]}`;
 }
 
 /**

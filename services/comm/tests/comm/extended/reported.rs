@@ -120,7 +120,7 @@ fn what_the_boards_do_what_is_lost_and_where_it_goes_are_told() {
         " order=1 product=7 delivered=2 ",
         " line_error=-2 left_duty=104 right_duty=96 code=00000011 ",
         " servos=512,300,301,488,512,512,200,- loads=0,-40,40,0,0,0,900,0 ",
-        " servo_errors=00100000 battery_dv=118 ",
+        " servo_errors=00100000 battery_dv=118 battery_percent=72 ",
         " sensor_up=1 steering_up=1 sensor_lost=3 steering_lost=4 bus_lost=11",
     ] {
         assert!(state.contains(field), "{field}: {state}");

@@ -1,0 +1,11 @@
+// Goods as a parcel with its number, in lists.
+
+import { put } from "../words/words.js";
+
+/** @returns {HTMLElement} */
+export function parcel(id) {
+  const element = document.createElement("span");
+  element.className = "parcel";
+  put(element, String(id));
+  return element;
+}
