@@ -16,6 +16,7 @@ mod scene;
 mod setting_up;
 mod signals;
 mod stopping;
+mod time;
 mod traps;
 
 use lager_orders::Sentence;
@@ -93,6 +94,7 @@ each_alone! {
     traps::what_is_pressed_while_the_panel_is_silent_is_refused_and_never_done,
     signals::the_view_of_signals_shows_the_station_s_last_minutes_and_holds_still,
     signals::what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_has_all_frames,
+    time::a_past_moment_is_marked_orders_nothing_and_is_the_same_on_another_page,
     releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
 }
 

@@ -144,6 +144,53 @@ fn any_time_of_a_robot_is_a_table_whose_heads_have_units() {
 }
 
 #[test]
+fn a_page_gets_no_more_lines_and_events_than_it_shows() {
+    let kept = Kept::new("lines");
+    let states =
+        (0..20).map(|at| line(kept.begin_ms + 2_000 + 50 * at, &format!("state x_mm={at}")));
+    let states: Vec<_> = states.collect();
+    kept.put("fine", 2_000, &states.concat());
+    let events = [
+        line(kept.begin_ms + 600, "event stopped 1 0 - - ordered comm"),
+        line(kept.begin_ms + 700, "event next_node 1 0 - -"),
+    ];
+    kept.put("events", 600, &events.concat());
+    let panel = kept.panel();
+    let (since, until) = (kept.begin_ms, kept.begin_ms + 3_000);
+    let asked = |what: &str| {
+        let span = format!("robot=r1&since={since}&until={until}");
+        content(&panel.ask_as_driver(&format!("/history/{what}{span}")))
+    };
+    // The states are told as they were, with the latencies, and 400 ms apart.
+    let lines = asked("lines?");
+    let told: Vec<_> = lines
+        .lines()
+        .map(|line| line.split("\"line\":").nth(1).unwrap())
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "\"state x_mm=400 node=1,0 battery_dv=114\"}",
+            "\"latency 700 40 99\"}",
+            "\"state x_mm=410 node=1,0 battery_dv=113\"}",
+            "\"state x_mm=0\"}",
+            "\"state x_mm=8\"}",
+            "\"state x_mm=16\"}",
+        ]
+    );
+    let newest = asked("events?most=1&");
+    assert!(
+        newest.contains("next_node") && newest.lines().count() == 1,
+        "{newest}"
+    );
+    let stops = asked("events?only=stopped,item_delivered&");
+    assert!(
+        stops.contains("event stopped") && stops.lines().count() == 1,
+        "{stops}"
+    );
+}
+
+#[test]
 fn the_history_has_the_doors_of_all_else() {
     let kept = Kept::new("doors");
     let panel = kept.panel();
