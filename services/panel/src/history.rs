@@ -9,8 +9,8 @@
 //!   GET /history/moment?robot=r1&at=<ms>                         likewise, the last of each report
 //! ```
 //!
-//! Times are in ms since 1970. Without `until` a time ends now, and without `since` it begins ten
-//! minutes before its end. `<line>` is a line of the station's extension, `thought <text>` or
+//! Times are in ms since 1970; the header `station-time-ms` of an answer says which is now. Without
+//! `until` a time ends now, and without `since` it begins ten minutes before its end. `<line>` is a line of the station's extension, `thought <text>` or
 //! `asked <name> <what>`, as in [`speech`](crate::speech). With `most` only the newest events are
 //! told, and with `only` those of these kinds; `lines` tells at most one state in [`APART_MS`].
 //!
