@@ -207,7 +207,7 @@ fn state(now: Moment, known: &Known, battery: &Battery) -> State {
     if state.battery_dv.is_some() {
         state.battery_percent = battery.percent();
         let left = battery.left();
-        state.battery_left_s = left.and_then(|left| u32::try_from(left.as_secs()).ok());
+        state.battery_left_s = left.map(|left| u16::try_from(left.as_secs()).unwrap_or(u16::MAX));
     }
     state
 }

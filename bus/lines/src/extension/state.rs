@@ -86,8 +86,8 @@ fields! {
         battery_dv: u8 = "a voltage from 0 to 255 tenths of a volt",
         /// The part of its charge that is left, in percent.
         battery_percent: u8 = "a percentage from 0 to 255",
-        /// How long that lasts until the robot stands, in s; left out unless it falls clearly.
-        battery_left_s: u32 = "a time from 0 to 4294967295 s",
+        /// How long that lasts until the robot stands, in s, at most 65535; left out unless it falls clearly.
+        battery_left_s: u16 = "a time from 0 to 65535 s",
         /// Whether the sensor board is heard.
         sensor_up: bool = "0 or 1",
         /// Whether the steering board is heard.

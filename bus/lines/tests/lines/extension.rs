@@ -154,7 +154,7 @@ fn the_fullest_state_fits_in_a_line() {
         servo_errors: Some(Binary(255)),
         battery_dv: Some(255),
         battery_percent: Some(255),
-        battery_left_s: Some(u32::MAX),
+        battery_left_s: Some(u16::MAX),
         sensor_up: Some(true),
         steering_up: Some(true),
         sensor_lost: Some(u32::MAX),

@@ -210,7 +210,7 @@ prop_compose! {
         distance_cm in of(any::<u8>()), left_duty in of(any::<u8>()),
         right_duty in of(any::<u8>()), code in of(any::<u8>()),
         servos in of(any::<[Option<u16>; 8]>()), battery_dv in of(any::<u8>()),
-        battery_percent in of(any::<u8>()), battery_left_s in of(any::<u32>()),
+        battery_percent in of(any::<u8>()), battery_left_s in of(any::<u16>()),
         loads in of(any::<[i16; 8]>()), servo_errors in of(any::<u8>()),
     ) -> State {
         State {
