@@ -459,7 +459,7 @@ pub(crate) fn in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_i
         page.pause();
         let small = page.value(
             "[...document.querySelectorAll('button, select, input, label.button')].filter((part) => { \
-               const box = (part.closest('label') ?? part).getBoundingClientRect(); \
+               const box = (part.closest('label, figure') ?? part).getBoundingClientRect(); \
                return box.width > 1 && (box.height < 44 || box.width < 44); \
              }).map((part) => part.id || part.name || part.textContent)",
         );

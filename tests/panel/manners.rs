@@ -280,10 +280,10 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     };
     let mut looks = open(&viewer);
     looks.wait_for("#driver", "you may look and stop");
-    looks.click("#clear");
+    looks.click("#do-horn");
     looks.wait_for("#missions-said", "this page may look and stop");
     looks.click("#language");
-    looks.click("#clear");
+    looks.click("#do-horn");
     looks.wait_for("#missions-said", "den här sidan får titta och stoppa");
     looks.click("#language");
     // The log shows the refused action.

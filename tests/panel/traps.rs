@@ -19,7 +19,7 @@ pub(crate) fn what_is_pressed_while_the_panel_is_silent_is_refused_and_never_don
     page: &mut Page,
 ) {
     scene.arm(page);
-    page.wait_until("document.querySelectorAll('#goods option').length > 2");
+    page.wait_until("document.querySelectorAll('#tiles button').length > 2");
     let waiting = page.value(WAITING);
     page.value("window.closed = 0; window.answers = []");
     page.listen_in();

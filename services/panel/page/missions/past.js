@@ -48,7 +48,7 @@ export class Past {
     const today = other < 0 ? this.jobs.length : other;
     put(this.parts.open, this.parts.box.hidden ? say("past_open", today) : say("past_close"));
     if (robot && now - robot.jobs.recalled > AGAIN_MS) recall(robot, now);
-    if (!this.parts.box.hidden) this.show();
+    this.show();
   }
 
   /** Today by the station's clock. */
