@@ -14,8 +14,8 @@ const PLACE: &str = "document.querySelector('#map > .robot:not([hidden])')?.getA
 const NOW: &str = "document.querySelector('#map .other:not([hidden]) .robot:not([hidden])')\
     ?.getAttribute('transform').match(/-?[\\d.]+/g).slice(0, 2).map(Number)";
 /// The page shows a past moment, and has drawn it.
-const IS_PAST: &str = "document.body.classList.contains('past') && \
-    !document.querySelector('#moment').hidden && document.querySelector('#moment strong').textContent !== ''";
+const IS_PAST: &str = "document.body?.classList.contains('past') === true && \
+    document.querySelector('#moment').hidden === false && document.querySelector('#moment strong').textContent !== ''";
 
 /// Makes the browser's clock wrong by so many hours, in pages that are opened from now on.
 fn wrong_clock(page: &mut Page, hours: i32) {
