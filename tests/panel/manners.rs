@@ -280,18 +280,21 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     };
     let mut looks = open(&viewer);
     looks.wait_for("#driver", "you may look and stop");
-    looks.click("#do-horn");
-    looks.wait_for("#missions-said", "this page may look and stop");
-    looks.click("#language");
-    looks.click("#do-horn");
-    looks.wait_for("#missions-said", "den här sidan får titta och stoppa");
-    looks.click("#language");
-    // The log shows the refused action.
-    looks.click("#tab-log");
-    looks.wait_for("#entries", "not done: this page may look and stop");
     looks.click("#tab-drive");
     looks.click("#control");
     looks.wait_for("#drive-said", "this page may look and stop");
+    looks.click("#language");
+    looks.click("#control");
+    looks.wait_for("#drive-said", "den här sidan får titta och stoppa");
+    looks.click("#language");
+    // What would order goods is off.
+    looks.click("#tab-missions");
+    looks.wait_until(
+        "['clear', 'do-horn', 'picks'].every((id) => document.getElementById(id).disabled)",
+    );
+    // The log shows the refused action.
+    looks.click("#tab-log");
+    looks.wait_for("#entries", "not done: this page may look and stop");
     looks.click("#stop");
     looks.wait_for("#stop-said", "both wheels stand");
     looks.wait_until("document.querySelector('#resume').ariaDisabled === 'true'");
