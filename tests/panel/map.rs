@@ -363,15 +363,11 @@ fn what_is_old_is_grey_and_keeps_its_shape_and_the_legend_says_what_all_of_it_is
     // A bar is where something was put, a cross where the robot found no way.
     let shapes = "['.placed', '.blocked path', '.route', '.next circle', '.good.wanted', '.good.queued', '.good.gone', '.ghost .hull', '.robot .hull', '.limbs path'] \
         .map((part) => document.querySelectorAll(`#map ${part}`).length).join()";
-    let before = page.value(shapes);
-    assert!(
-        !before
-            .as_str()
-            .expect("numbers")
-            .split(',')
-            .any(|count| count == "0"),
-        "{before}"
-    );
+    let before = wait_for("all of it on the map", || {
+        let counts = page.value(shapes);
+        let is_all = !counts.as_str()?.split(',').any(|count| count == "0");
+        is_all.then_some(counts)
+    });
     // The legend is closed until a person opens it, and then it covers no robot.
     assert_eq!(
         page.value("document.querySelector('#map-legend').open"),

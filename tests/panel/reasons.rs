@@ -11,7 +11,7 @@ use crate::played::Stage;
 /// The page's sentences for these reasons.
 fn told(page: &mut Page, reasons: &[&str]) -> Value {
     let expression = format!(
-        "import('/sentences.js').then(({{ reason }}) => {}.map(reason))",
+        "import('/words/sentences.js').then(({{ reason }}) => {}.map(reason))",
         json!(reasons)
     );
     let params = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });

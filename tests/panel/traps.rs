@@ -70,6 +70,7 @@ fn a_page_of_another_version_says_so_drives_nothing_and_still_stops() {
     page.wait_until("document.documentElement.dataset.edition !== 'older'");
     page.wait_for("#link", " ms");
     page.wait_for("#state", "STOPPED");
+    scene.resume();
     drop(page);
     scene.end();
 }
