@@ -21,12 +21,12 @@ pub(crate) fn what_is_pressed_while_the_panel_is_silent_is_refused_and_never_don
     scene.arm(page);
     page.wait_until("document.querySelectorAll('#tiles button').length > 2");
     let waiting = page.value(WAITING);
-    page.value("window.closed = 0; window.answers = []");
+    page.value("window.closes = 0; window.answers = []");
     page.listen_in();
-    page.value("tapped.addEventListener('close', () => closed++)");
+    page.value("tapped.addEventListener('close', () => closes++)");
     let frozen = scene.freeze("station");
     page.wait_until("document.body.classList.contains('stale')");
-    assert_eq!(page.value("closed"), 0, "nothing has closed the socket");
+    assert_eq!(page.value("closes"), 0, "nothing has closed the socket");
     for _ in 0..10 {
         page.key_down("ArrowUp");
         page.key_up("ArrowUp");
