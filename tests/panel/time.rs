@@ -167,7 +167,7 @@ fn the_log_is_filtered_by_kinds_and_goes_further_back_than_the_page_holds() {
         "state hold=none mode=autonomous stopped=0 battery_dv=114 sensor_up=1 x_mm=0 y_mm=0";
     let says = |event: &'static str| -> Vec<&'static str> {
         std::iter::once(state)
-            .chain(std::iter::repeat_n(event, 20))
+            .chain(std::iter::repeat_n(event, 4))
             .collect()
     };
     let robot = stage.robot("r1", &says("event next_node 1 0 - -"));
