@@ -3,6 +3,7 @@
 import { readFileSync } from "node:fs";
 
 const SENTENCES = new URL("../../../bus/orders/sentences.txt", import.meta.url);
+/** The panel sends those of `lager-floor`. No test looks at them. */
 const LIMITS = { squares: 20, leastSideCm: 20, mostSideCm: 100, goods: 50 };
 
 /** A name, and below it the sentence in English and in Swedish. */

@@ -94,6 +94,7 @@ const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, 
 const signals = new Later(
   { view: at("signals"), said: at("signals-state"), again: at("signals-again") },
   () => at("armed").checked,
+  link,
   (query) => (query ? import(`./signals/signals.js${query}`) : import("./signals/signals.js")),
 );
 const strips = new Strips(at("strips"), (lane) => {

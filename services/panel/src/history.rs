@@ -9,8 +9,8 @@
 //!   GET /history/moment?robot=r1&at=<ms>                         likewise, the last of each report
 //! ```
 //!
-//! Times are in ms since 1970; the header `station-time-ms` of an answer says which is now. Without
-//! `until` a time ends now, and without `since` it begins ten minutes before its end. `<line>` is a line of the station's extension, `thought <text>` or
+//! Times are in ms since 1970. Without `until` a time ends now, and without `since` it begins ten
+//! minutes before its end. `<line>` is a line of the station's extension, `thought <text>` or
 //! `asked <name> <what>`, as in [`speech`](crate::speech). With `most` only the newest events are
 //! told, and with `only` those of these kinds; `lines` tells at most one state in [`APART_MS`].
 //!
@@ -25,7 +25,7 @@ use std::ops::{ControlFlow, RangeInclusive};
 use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
-use axum::http::{HeaderName, StatusCode, header};
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use futures_util::stream::unfold;
 use lager_lines::Name;
@@ -47,8 +47,6 @@ const PIECE: usize = 32 * 1024;
 /// The time before the end that is meant when nobody says since when, in ms.
 const USUAL_MS: u64 = 600_000;
 
-/// The station's clock in an answer, in ms since 1970: a browser's may be wrong.
-pub(crate) const STATION_TIME: HeaderName = HeaderName::from_static("station-time-ms");
 /// `lines` leaves out a state that came sooner than this after the one before it, in ms: a curve of
 /// a minute that is as wide as a hand needs no more.
 const APART_MS: u64 = 400;

@@ -335,8 +335,7 @@ async fn past(
     }
     visitor.admit();
     let query = query.unwrap_or_default();
-    let now_ms = History::now_ms();
-    let wanted = match history::Wanted::read(&what, &query, now_ms) {
+    let wanted = match history::Wanted::read(&what, &query, History::now_ms()) {
         Ok(wanted) => wanted,
         Err(why) => return refuse(StatusCode::BAD_REQUEST, Reason::new(Code::Misread, &[&why])),
     };
@@ -348,10 +347,7 @@ async fn past(
     };
     // The number of answers and the time of each are limited.
     visitor.let_stay();
-    let mut response = history::answer(history, wanted, permit);
-    let now = (history::STATION_TIME, now_ms.into());
-    response.headers_mut().extend([now]);
-    guarded(response)
+    guarded(history::answer(history, wanted, permit))
 }
 
 /// Whether the panel's own page asks: by its origin, or by what the browser says of it.

@@ -1,12 +1,10 @@
 // What the station keeps of the last day as a file: a table, or a recording.
 
-import { entries } from "../time/kept.js";
+import { SPANS_MS, entries } from "../time/kept.js";
 import { mcap } from "./mcap.js";
 import { ask, lines, why } from "../station/history.js";
 import { put, say, span } from "../words/words.js";
 
-/** How long ago what is saved may be, in ms. */
-const SPANS_MS = [600_000, 3_600_000, 86_400_000];
 /** What a recording has of one moment, by the names of the table's columns. */
 const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "string", "null"] } };
 /** What a recording has of what happened: the words of the station, and a thought's values. */

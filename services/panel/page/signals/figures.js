@@ -1,6 +1,8 @@
 // The figures of one robot in the last ten minutes, as columns by time: what the station has kept, and then
 // what this page hears. Times are in ms by the station's clock: a browser's may be wrong.
 
+import { ask, why } from "../station/history.js";
+
 /** @typedef {"line_error" | "left_duty" | "right_duty" | "distance_cm" | "battery" | "path_p50" | "path_p99" | "lost"} Key */
 /** @typedef {{ at: number } & Record<Key, number | null>} Row */
 
@@ -116,16 +118,14 @@ function increase(counts, first, last) {
 
 /** The figures of a robot that this page shows. */
 export class Figures {
-  /** @param {import("../station/robot.js").Robot} robot */
-  constructor(robot) {
+  /**
+   * @param {import("../station/robot.js").Robot} robot
+   * @param {Pick<import("../station/link.js").Link, "ahead">} link
+   */
+  constructor(robot, link) {
     this.robot = robot;
+    this.link = link;
     this.columns = new Columns();
-    /**
-     * The station's clock less this page's, in ms; null: the station has not answered yet.
-     *
-     * @type {number | null}
-     */
-    this.ahead = null;
     /** How many states of all that the page has heard are in the columns. */
     this.taken = 0;
     /** Whether the station is asked, and when it is asked next, by this page's clock. */
@@ -140,26 +140,16 @@ export class Figures {
   }
 
   /**
-   * The time by the station's clock; null if that is not known yet.
-   *
-   * @param {number} now by this page's
-   */
-  time(now) {
-    return this.ahead === null ? null : now + this.ahead;
-  }
-
-  /**
    * Takes in what is new.
    *
-   * @param {number} now
+   * @param {number} now by this page's clock
    */
   follow(now) {
     const { past, total } = this.robot;
     // The page keeps a minute: what it has forgotten meanwhile the station still has.
     if (total - this.taken > past.length) this.next = Math.min(this.next, now);
-    if (now >= this.next && !this.isAsked) this.ask();
-    if (this.ahead === null) return;
-    if (total > this.taken) this.hear(past.slice(-(total - this.taken)), this.ahead);
+    if (now >= this.next && !this.isAsked) this.fetch();
+    if (total > this.taken) this.hear(past.slice(-(total - this.taken)));
     this.columns.cut();
   }
 
@@ -167,46 +157,31 @@ export class Figures {
    * Adds what the page has heard.
    *
    * @param {Row[]} rows with times by this page's clock
-   * @param {number} ahead
    */
-  hear(rows, ahead) {
+  hear(rows) {
     this.taken = this.robot.total;
-    for (const row of rows) this.columns.push({ ...row, at: row.at + ahead });
+    for (const row of rows) this.columns.push({ ...row, at: row.at + this.link.ahead });
   }
 
   /** Fetches the last ten minutes from the station. */
-  async ask() {
+  async fetch() {
     this.isAsked = true;
     try {
-      const query = new URLSearchParams({ robot: this.robot.name });
-      const sent = performance.now();
-      const answer = await fetch(new URL(`history/states.csv?${query}`, location.href), { cache: "no-store" });
-      const ahead = stationTime(answer.headers) - (sent + performance.now()) / 2;
-      this.ahead = ahead;
-      this.why = answer.ok ? null : ({ 404: "no_history", 503: "history_busy" }[answer.status] ?? "lost");
-      // A station without a history will have none later.
-      this.next = answer.ok || answer.status === 404 ? Infinity : performance.now() + AGAIN_MS;
-      if (!answer.ok || !answer.body) return;
+      const { body } = await ask("states.csv", { robot: this.robot.name });
       const columns = new Columns();
-      for await (const row of table(answer.body)) columns.push(row);
+      if (body) for await (const row of table(body)) columns.push(row);
       this.columns = columns;
-      this.hear(this.robot.past, ahead);
-    } catch {
-      this.why = "lost";
-      this.next = performance.now() + AGAIN_MS;
+      this.hear(this.robot.past);
+      this.why = null;
+      this.next = Infinity;
+    } catch (error) {
+      this.why = why(error);
+      // A station without a history will have none later.
+      this.next = this.why === "no_history" ? Infinity : performance.now() + AGAIN_MS;
     } finally {
       this.isAsked = false;
     }
   }
-}
-
-/**
- * The station's clock in an answer, in ms since 1970; every answer has at least its second.
- *
- * @param {Headers} headers
- */
-function stationTime(headers) {
-  return Number(headers.get("station-time-ms") ?? Date.parse(headers.get("date") ?? "") + 500);
 }
 
 /**

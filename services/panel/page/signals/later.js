@@ -7,11 +7,13 @@ export class Later {
   /**
    * @param {{ view: HTMLElement, said: HTMLElement, again: HTMLElement }} parts
    * @param {() => boolean} isArmed whether the keys drive the robot
+   * @param {import("../station/link.js").Link} link
    * @param {(query: string) => Promise<{ Signals: any }>} load fetches the script; its address ends with the query
    */
-  constructor(parts, isArmed, load) {
+  constructor(parts, isArmed, link, load) {
     this.parts = parts;
     this.isArmed = isArmed;
+    this.link = link;
     this.script = load;
     this.signals = null;
     this.tries = 0;
@@ -28,7 +30,7 @@ export class Later {
     const tries = this.tries++;
     try {
       const { Signals } = await this.script(tries ? `?${tries}` : "");
-      this.signals = new Signals(this.parts.view, this.isArmed);
+      this.signals = new Signals(this.parts.view, this.isArmed, this.link);
       this.state = null;
     } catch {
       this.state = "failed";

@@ -20,10 +20,12 @@ export class Signals {
   /**
    * @param {HTMLElement} view
    * @param {() => boolean} isArmed whether the keys drive the robot
+   * @param {import("../station/link.js").Link} link
    */
-  constructor(view, isArmed) {
+  constructor(view, isArmed, link) {
     this.view = view;
     this.isArmed = isArmed;
+    this.link = link;
     this.span = new Span();
     /** @type {Figures | null} */
     this.figures = null;
@@ -119,15 +121,14 @@ export class Signals {
     if (this.figures?.robot !== robot) {
       const { ms } = this.span;
       this.span = Object.assign(new Span(), { ms });
-      this.figures = new Figures(robot);
+      this.figures = new Figures(robot, this.link);
       this.drawnAside = -Infinity;
     }
     const { figures, span } = this;
     if (!span.held) figures.follow(now);
     const why = figures.why ?? (figures.isAsked ? "history_fetched" : null);
     put(this.said, why ? say(why) : "");
-    const time = figures.time(now);
-    if (time === null) return;
+    const time = now + this.link.ahead;
     this.now = time;
     this.tools.draw(span, time);
     this.tellCursor(this.at);

@@ -4,7 +4,9 @@ import { lines, why } from "../station/history.js";
 import { note } from "../station/report.js";
 
 /** The station keeps a day, in ms. */
-export const DAY_MS = 86_400_000;
+const DAY_MS = 86_400_000;
+/** The spans of it that can be shown and saved, in ms. */
+export const SPANS_MS = [600_000, 3_600_000, DAY_MS];
 /** So much is fetched at a time. */
 const MOST = 500;
 /** Told twice, a thing may be this much earlier or later, in ms: the ways of the two answers differ. */

@@ -6,10 +6,8 @@ import { isText } from "../bar/stop.js";
 import { kindOf } from "../log/kinds.js";
 import { make, set } from "../parts/svg.js";
 import { clock, put, say, span } from "../words/words.js";
-import { DAY_MS } from "./kept.js";
+import { SPANS_MS } from "./kept.js";
 
-/** The spans of the line, in ms. */
-const SPANS_MS = [600_000, 3_600_000, DAY_MS];
 /** A press of an arrow goes this far, and a page key ten times as far, in ms. */
 const STEPS_MS = [1_000, 5_000, 60_000];
 /** Nearer to the right end than this, in pixels, it is now. */
