@@ -195,10 +195,15 @@ impl Page {
         });
     }
 
-    /// Waits until an expression of the page is true.
+    /// Waits until an expression of the page is true. While the page loads, parts that the expression
+    /// names may be missing: then it is not true yet.
     pub(crate) fn wait_until(&mut self, expression: &str) {
+        let once_loaded = format!(
+            "(() => {{ try {{ return ({expression}); }} \
+             catch (missing) {{ if (document.readyState === 'loading') return false; throw missing; }} }})()"
+        );
         wait_for(expression, || {
-            (self.value(expression) == true).then_some(())
+            (self.value(&once_loaded) == true).then_some(())
         });
     }
 
