@@ -6,9 +6,11 @@ use lager_operator::Seen;
 use lager_orders::Mode;
 use lager_stop::Stop;
 use lager_topics::{
-    BlockedWays, DistanceFrame, Durations, Health, LineFrame, NavigatorStatus, OrderQueue, Route,
-    SteeringReport, Truth, WarehouseMap,
+    BlockedWays, BoardHealth, DistanceFrame, Durations, Health, LineFrame, NavigatorStatus,
+    OrderQueue, Route, SteeringReport, Truth, WarehouseMap,
 };
+
+use crate::health::Machine;
 use lager_wire::Version;
 
 /// The last sample of each topic that comm uses. `None`: no sample has come.
@@ -23,6 +25,12 @@ pub(crate) struct Known {
     pub(crate) senses: Senses,
     /// Somebody has told where the robot really is, so there is a simulated world to ask.
     pub(crate) is_simulated: bool,
+    /// When each board was last heard, in ns: sensor, steering.
+    pub(crate) boards_ns: [Option<u64>; 2],
+    /// How long the last sign took to the station and back, in ms.
+    pub(crate) trip_ms: Option<u32>,
+    /// How the machine is.
+    pub(crate) machine: Machine,
     /// The warehouse that this process or an earlier one has published.
     pub(crate) map: Option<Box<WarehouseMap>>,
 }
@@ -55,6 +63,20 @@ pub struct Senses {
 }
 
 impl Known {
+    /// Takes the bridge's state. Returns the one before it.
+    pub(crate) fn take_health(&mut self, now_ns: u64, health: &Health) -> Option<Health> {
+        let before = self.health.replace(*health);
+        let boards = |health: &Health| [health.sensor, health.steering];
+        for (place, board) in boards(health).iter().enumerate() {
+            let count = |board: &BoardHealth| (board.epoch, board.packets);
+            let was = before.as_ref().map(|before| count(&boards(before)[place]));
+            if board.up != 0 && was != Some(count(board)) {
+                self.boards_ns[place] = Some(now_ns);
+            }
+        }
+        before
+    }
+
     /// Who may drive.
     pub(crate) fn mode(&self) -> Option<Mode> {
         self.health.and_then(|health| health.mode.get())

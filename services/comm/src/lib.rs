@@ -15,6 +15,7 @@
 mod asking;
 mod conversation;
 mod effect;
+mod health;
 mod known;
 mod link;
 mod lost;
@@ -29,6 +30,7 @@ mod telling;
 
 pub use conversation::Conversation;
 pub use effect::Effect;
+pub use health::Machine;
 pub use known::Senses;
 pub use lost::LinkLost;
 pub use secret::{SecretsError, secrets_at};

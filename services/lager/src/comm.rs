@@ -10,6 +10,7 @@ use lager_wake::{GivenUp, Shutdown, Watchdog};
 
 use crate::cli::CommArgs;
 use crate::config::{Config, StationSection};
+use crate::doctor;
 
 /// How long one call into the bus may take, in real time.
 const CALL: Duration = Duration::from_secs(3);
@@ -36,6 +37,7 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
         secret: args.secret.clone().or_else(|| joined.comm.secret.clone()),
         link_lost: joined.comm.link_lost,
         resume: args.service.resume,
+        findings: doctor::soon::findings,
     };
     Ok((joined, wanted))
 }
