@@ -4,6 +4,7 @@
 mod browser;
 mod driving;
 mod fleet;
+mod health;
 mod manners;
 mod map;
 mod needs;
@@ -86,6 +87,11 @@ each_alone! {
     driving::a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it,
     driving::in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants,
     driving::after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile,
+    health::a_killed_service_shows_as_died_and_back_with_its_count,
+    health::help_opens_by_key_and_stop_works_over_it,
+    health::the_theme_survives_a_reload_and_is_the_display_s_too,
+    health::what_drives_is_shown_as_pressed,
+    health::a_person_s_name_is_at_the_wheel_and_at_the_stop,
     releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
 }
 

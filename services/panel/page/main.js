@@ -5,6 +5,9 @@ import { Asked, Where } from "./drive/ask.js";
 import { Bar } from "./bar/bar.js";
 import { choose, named, shown } from "./station/chosen.js";
 import { Driving } from "./drive/drive.js";
+import { Health } from "./health/health.js";
+import { Help } from "./help/help.js";
+import { nameTheme, switchesTheme } from "./help/theme.js";
 import { Fleet } from "./fleet/fleet.js";
 import { ByHand } from "./drive/hand.js";
 import { Line } from "./line/line.js";
@@ -52,7 +55,7 @@ const missions = new Missions(link, {
   said: at("missions-said"), queue: at("queue"), history: at("history"),
 }, robot);
 const arm = new Arm(at("arm-drawing"));
-const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), resume: at("drive-resume") }, robot, now);
+const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), sticks: at("sticks"), resume: at("drive-resume") }, robot, now);
 const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("hand-said"), take: at("hand-now"), leave: at("hand-leave") }, robot, () => act("mode manual"), (...words) => driving.tell(...words));
 const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
 const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: at("hand-over"), keep: at("keep") }, robot, () => driving.letGo());
@@ -70,6 +73,10 @@ const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, 
 });
 const strips = new Strips(at("strips"));
 const notify = new Notify(link, at("notify"));
+const list = (section) => at(`health-${section}`).querySelector("ul");
+const health = new Health(link, { body: at("health"), said: at("health-said"), chain: list("links"), services: list("services"), machine: list("machine"), losses: list("losses"), versions: list("versions") });
+const help = new Help({ dialog: at("help"), body: at("help-body"), open: at("help-open"), close: at("help-close"), legend: document.querySelector("#map-legend ul") }, () => at("armed").checked);
+switchesTheme(at("theme"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
 
 /** Puts an obstacle on a way of a simulated world, or takes it away. */
@@ -163,6 +170,8 @@ function show(tab) {
 /** Words that change with the language or with who looks. */
 function words() {
   at("language").textContent = say("language");
+  nameTheme(at("theme"));
+  if (help.dialog.open) help.write();
   for (const element of document.querySelectorAll(".driver-only")) element.disabled = !link.mayDrive;
 }
 
@@ -243,6 +252,7 @@ function drawRest(shown, time) {
   byHand.draw(shown);
   log.draw(shown);
   notify.draw(time);
+  health.draw(shown, time);
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", called(shown.driver)] : ["control_free"];
   put(at("control"), say(...seat));

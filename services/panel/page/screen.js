@@ -15,6 +15,9 @@ const name = () => robot()?.name ?? named();
 const stop = new Stop(link, { form: at("stop-place"), button: at("stop"), said: at("stop-said") }, robot, name);
 let wasStopped = false;
 
+/** How often it is drawn, in ms. */
+const REST_MS = 200;
+
 function picture() {
   const seen = robot();
   const isStopped = seen?.state.stopped === "1";
@@ -23,9 +26,10 @@ function picture() {
   wasStopped = isStopped;
   show(face(link, seen, performance.now()), seen);
   put(at("robot"), name() ?? "");
-  const { mode, battery_dv } = seen?.state ?? {};
-  const volts = battery_dv === undefined ? "" : say("volts", decimal(Number(battery_dv) / 10));
-  put(at("figures"), [mode ? say(`mode_${mode}`) : "", volts].filter(Boolean).join(" \u00b7 "));
-  requestAnimationFrame(picture);
+  const { mode, battery_dv: decivolts, hold } = seen?.state ?? {};
+  const volts = decivolts === undefined ? "" : say(hold === "battery" ? "battery_low" : "volts", decimal(Number(decivolts) / 10));
+  const waits = seen?.queue.length ? say("orders_wait", seen.queue.length) : "";
+  put(at("figures"), [mode ? say(`mode_${mode}`) : "", volts, waits].filter(Boolean).join(" \u00b7 "));
+  setTimeout(() => requestAnimationFrame(picture), REST_MS);
 }
 requestAnimationFrame(picture);

@@ -67,7 +67,10 @@ static TABLE: LazyLock<String> = LazyLock::new(|| {
         "goods": lager_floor::MAX_PRODUCTS,
     });
     let table = serde_json::json!(table);
-    format!("export const TABLE = {table};\nexport const LIMITS = {limits};\n")
+    let release = env!("CARGO_PKG_VERSION");
+    format!(
+        "export const TABLE = {table};\nexport const LIMITS = {limits};\nexport const RELEASE = \"{release}\";\n"
+    )
 });
 
 /// A file as it is written.
@@ -264,7 +267,9 @@ mod tests {
         assert!(unknown.is_empty(), "said and not in the table: {unknown:?}");
         // Others stand in lists and in names that are put together.
         let everything: String = FILES.iter().map(|(.., content)| *content).collect();
-        let put_together = ["mode_", "did_", "servo_", "board_", "side_"];
+        let put_together = [
+            "mode_", "did_", "servo_", "board_", "side_", "look_", "colour_", "theme_", "mark_",
+        ];
         let unsaid: Vec<_> = known
             .iter()
             .filter(|key| !said.contains(*key))

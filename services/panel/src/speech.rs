@@ -22,6 +22,8 @@
 //! ```text
 //! you <name> driver|viewer          what this page is called and may do; the first line. A person
 //!                                   asks for a name by the socket's address (`/live?name=Anna`)
+//! station <release>                 the release of this program
+//! here <ms>                         what the page has said, back, so it knows its round trip
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
 //! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>

@@ -58,7 +58,12 @@ impl Visit {
     pub(crate) fn new(page: OpenPage, rank: Rank) -> Self {
         let now = Instant::now();
         Self {
-            lines: format!("you {} {}\n", page.name, rank.as_str()),
+            lines: format!(
+                "you {} {}\nstation {}\n",
+                page.name,
+                rank.as_str(),
+                env!("CARGO_PKG_VERSION")
+            ),
             subscription: page.shared.handle.recall(),
             began: page.shared.handle.now(),
             page,
@@ -115,6 +120,7 @@ impl Visit {
         }
         if let Said::Here { said_ms } = said {
             self.late.hear(said_ms, handle.now());
+            self.lines.push_str(&format!("here {said_ms}\n"));
             return;
         }
         let (Said::Do { number, .. }

@@ -11,6 +11,7 @@
 // command to stand: what is held ends before one, and nothing is held or begun while one is under way.
 
 import { Pads } from "./pads.js";
+import { drawSticks } from "./sticks.js";
 import { reason } from "../words/sentences.js";
 import { isText } from "../bar/stop.js";
 import { say } from "../words/words.js";
@@ -54,6 +55,12 @@ const STEPS = [
 
 /** Keys whose names are long, as they are printed on keyboards. */
 const SIGNS = { ArrowUp: "\u2191", ArrowDown: "\u2193", ArrowLeft: "\u2190", ArrowRight: "\u2192", PageUp: "PgUp", PageDown: "PgDn" };
+
+/** Each key that drives or moves the arm, as it is printed, with the word for what it does. */
+export const KEYS = {
+  wheels: [...HELD, ...ONCE].filter(([, , keys]) => keys.length).map(([, word, keys]) => [SIGNS[keys[0]], word]),
+  arm: STEPS.map(([, word, keys]) => [keys.join(" "), word]),
+};
 
 export class Driving {
   constructor(link, parts, robot, now) {
@@ -119,8 +126,14 @@ export class Driving {
     if (this.held) this.older.push(this.held);
     else this.timer = setInterval(() => this.renew(), RENEW_MS);
     this.held = { code, source, button, robot };
-    button?.classList.add("down");
+    this.press();
     this.renew();
+  }
+
+  /** Shows what is held as pressed, by whatever it is held. */
+  press() {
+    const codes = [this.held, ...this.older].map((held) => `drive ${held?.code}`);
+    for (const button of this.parts.pad.children) button.classList.toggle("down", codes.includes(button.dataset.action));
   }
 
   async renew() {
@@ -146,7 +159,7 @@ export class Driving {
     const { robot } = this.held;
     this.held = null;
     this.older = [];
-    for (const button of document.querySelectorAll("#pad .down")) button.classList.remove("down");
+    this.press();
     if (this.link.open) this.link.act(robot, `drive ${STAND}`);
     if (why.length) this.tell(...why);
   }
@@ -155,14 +168,13 @@ export class Driving {
   release(source) {
     if (this.held?.source === source) {
       if (!this.older.length) return this.letGo();
-      this.held.button?.classList.remove("down");
       this.held = this.older.pop();
+      this.press();
       this.renew();
       return;
     }
-    const ended = this.older.find((other) => other.source === source);
-    ended?.button?.classList.remove("down");
-    this.older = this.older.filter((other) => other !== ended);
+    this.older = this.older.filter((other) => other.source !== source);
+    this.press();
   }
 
   async once(action) {
@@ -178,7 +190,10 @@ export class Driving {
     this.tell(null);
     if (isStand) return this.hear(await this.link.act(robot, action));
     this.step = robot;
+    const button = document.querySelector(`[data-action="${action}"]`);
+    button?.classList.add("down");
     const answer = await this.link.act(robot, action);
+    button?.classList.remove("down");
     if (this.step === robot) this.step = null;
     this.hear(answer);
   }
@@ -193,15 +208,15 @@ export class Driving {
       const held = HELD.find(([, word]) => word === name);
       const once = ONCE.find(([, word]) => word === name);
       if (held) this.heldButton(pad, ...held);
-      else addButton(pad, name, once[2]).addEventListener("click", () => this.once(`drive ${once[0]}`));
+      else addButton(pad, name, once[2], `drive ${once[0]}`).addEventListener("click", () => this.once(`drive ${once[0]}`));
     }
     for (const [code, word, keys] of STEPS) {
-      addButton(arm, word, keys).addEventListener("click", () => this.once(`arm ${code}`));
+      addButton(arm, word, keys, `arm ${code}`).addEventListener("click", () => this.once(`arm ${code}`));
     }
   }
 
   heldButton(pad, code, word, keys) {
-    const button = addButton(pad, word, keys);
+    const button = addButton(pad, word, keys, `drive ${code}`);
     button.addEventListener("pointerdown", (event) => {
       button.setPointerCapture(event.pointerId);
       this.hold(code, button, button);
@@ -249,6 +264,7 @@ export class Driving {
     addEventListener("contextmenu", (event) => event.defaultPrevented || this.letGo());
     addEventListener("pointerdown", (event) => ownsKeys(event.target) && this.letGo(), { capture: true });
     this.parts.armed.addEventListener("change", () => {
+      drawSticks(this.parts.sticks, null);
       this.gamepads.forget();
       this.letGo();
     });
@@ -261,6 +277,7 @@ export class Driving {
     if (!this.parts.armed.checked) return;
     const was = this.padCode;
     this.padCode = this.gamepads.read();
+    drawSticks(this.parts.sticks, this.gamepads.axes);
     if (was === this.padCode) return;
     this.release("pad");
     if (this.padCode) this.hold(this.padCode, "pad");
@@ -277,10 +294,11 @@ function place({ code, key }) {
   return code || key;
 }
 
-function addButton(parent, word, keys) {
+function addButton(parent, word, keys, action) {
   const button = document.createElement("button");
   button.type = "button";
   button.dataset.word = word;
+  button.dataset.action = action;
   button.id = `${parent.id}-${word}`;
   button.textContent = say(word);
   if (keys.length) {

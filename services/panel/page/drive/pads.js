@@ -47,6 +47,8 @@ export class Pads {
     this.since = this.now();
     /** The entry that says something, by its place. */
     this.speaks = null;
+    /** The axes of the entry that counts, or of one that does not yet; null without a gamepad. */
+    this.axes = null;
   }
 
   /** The code of the wheels that is held on a pad, or null. */
@@ -61,6 +63,7 @@ export class Pads {
     const counts = there.filter(({ pad, index }) => this.isBelieved(pad, index, newest, there));
     // Who speaks goes on speaking; another pad does not talk into it.
     const speaker = counts.find(({ index }) => index === this.speaks) ?? counts.find(({ pad }) => code(pad));
+    this.axes = (speaker ?? counts[0] ?? there[0])?.pad.axes ?? null;
     const said = speaker ? code(speaker.pad) : null;
     this.speaks = said ? speaker.index : null;
     return said;

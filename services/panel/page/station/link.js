@@ -3,6 +3,8 @@
 // What the station says, one or more lines in a message (services/panel/src/speech.rs):
 //
 //   you <name> driver|viewer
+//   station <release of its program>
+//   here <ms>                         what the page has said, back
 //   warehouse <json>
 //   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
@@ -53,6 +55,8 @@ class Robot {
     this.latency = null;
     /** What each line sensor has read in the last calibration, the leftmost first. */
     this.sensors = null;
+    /** How its machine, services and boards are, and when that came. */
+    this.health = {};
     this.route = [];
     /** The products whose goods are not in their place: delivered, in the claw, or somewhere else. */
     this.gone = new Set();
@@ -108,6 +112,11 @@ export class Link extends EventTarget {
     this.warehouse = null;
     this.me = null;
     this.mayDrive = false;
+    /** The release of the station's program. */
+    this.release = null;
+    /** When the station was last heard, and how long its last answer to `here` took, in ms. */
+    this.heard = -Infinity;
+    this.trip = null;
     this.open = false;
     /** Why the station has closed the connection, if it has said so. */
     this.closed = null;
@@ -131,6 +140,7 @@ export class Link extends EventTarget {
       this.emit("link");
     };
     socket.onmessage = (message) => {
+      this.heard = performance.now();
       for (const line of message.data.split("\n")) {
         if (line) this.hear(line);
       }
@@ -214,6 +224,10 @@ export class Link extends EventTarget {
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
+    } else if (word === "here") {
+      this.trip = clock() - Number(rest[0]);
+    } else if (word === "station") {
+      this.release = rest[0];
     } else if (word === "you") {
       // All that has happened is told after this.
       for (const robot of this.robots.values()) robot.forget();
@@ -278,6 +292,8 @@ export class Link extends EventTarget {
       for (let i = 1; i + 1 < rest.length; i += 2) {
         robot.queue.push({ order: rest[i], product: rest[i + 1] });
       }
+    } else if (word === "health") {
+      robot.health = { ...fields(rest), at: now };
     } else if (word === "truth") {
       const [x, y, heading, carrying] = rest;
       robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
