@@ -9,9 +9,9 @@ use lager_topics::{
     BlockedWays, BoardHealth, DistanceFrame, Durations, Health, LineFrame, NavigatorStatus,
     OrderQueue, Route, SteeringReport, Truth, WarehouseMap,
 };
+use lager_wire::Version;
 
 use crate::health::Machine;
-use lager_wire::Version;
 
 /// The last sample of each topic that comm uses. `None`: no sample has come.
 #[derive(Clone, Debug, Default)]
