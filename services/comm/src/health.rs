@@ -8,24 +8,11 @@ use std::sync::OnceLock;
 
 use lager_home::{Home, UnitName, Watched};
 use lager_lines::Name;
-use lager_lines::extension::{Finding, Findings, Health, Release, Report, Service, Services};
+use lager_lines::extension::{Findings, Health, Release, Report, Service, Services};
 use lager_orders::Moment;
 use lager_topics::BoardHealth;
 
-use crate::known::Known;
-
-/// How the robot's machine and its services are, at one moment.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Machine {
-    /// How many processes want a core, in percent of the cores; `None` is not known.
-    pub load_percent: Option<u32>,
-    /// All its memory and what programs can still get, in MiB.
-    pub memory_mib: Option<[u32; 2]>,
-    /// The services that `lager up` keeps alive.
-    pub services: Vec<Watched>,
-    /// What is wrong with the machine.
-    pub found: Vec<Finding>,
-}
+use crate::known::{Known, Machine};
 
 impl Machine {
     /// How it is now, without the findings.

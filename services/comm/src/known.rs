@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use lager_home::Watched;
+use lager_lines::extension::Finding;
 use lager_operator::Seen;
 use lager_orders::Mode;
 use lager_stop::Stop;
@@ -10,8 +12,6 @@ use lager_topics::{
     OrderQueue, Route, SteeringReport, Truth, WarehouseMap,
 };
 use lager_wire::Version;
-
-use crate::health::Machine;
 
 /// The last sample of each topic that comm uses. `None`: no sample has come.
 #[derive(Clone, Debug, Default)]
@@ -60,6 +60,19 @@ pub struct Senses {
     pub latency: Option<Box<Durations>>,
     /// Where a simulated robot really is.
     pub truth: Option<Box<Truth>>,
+}
+
+/// How the robot's machine and its services are, at one moment.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Machine {
+    /// How many processes want a core, in percent of the cores; `None` is not known.
+    pub load_percent: Option<u32>,
+    /// All its memory and what programs can still get, in MiB.
+    pub memory_mib: Option<[u32; 2]>,
+    /// The services that `lager up` keeps alive.
+    pub services: Vec<Watched>,
+    /// What is wrong with the machine.
+    pub found: Vec<Finding>,
 }
 
 impl Known {

@@ -30,8 +30,8 @@ mod telling;
 
 pub use conversation::Conversation;
 pub use effect::Effect;
-pub use health::Machine;
-pub use known::Senses;
+
+pub use known::{Machine, Senses};
 pub use lost::LinkLost;
 pub use secret::{SecretsError, secrets_at};
 pub use shell::{CommConfig, run};

@@ -13,7 +13,7 @@ use lager_topics::{
 };
 
 use super::{AGAIN, Asker, Conversation, STOPPED, UNTOLD};
-use crate::health::Machine;
+use crate::known::Machine;
 use crate::known::{Senses, Stood};
 use crate::{speech, telling};
 
