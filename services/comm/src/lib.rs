@@ -30,7 +30,6 @@ mod telling;
 
 pub use conversation::Conversation;
 pub use effect::Effect;
-
 pub use known::{Machine, Senses};
 pub use lost::LinkLost;
 pub use secret::{SecretsError, secrets_at};
