@@ -76,7 +76,7 @@ fn the_terminal_says_what_the_robot_does_and_a_person_orders_more() {
             .map(|_| ())
     });
     // Others wait their turn, and an unknown product is refused.
-    for (product, turn) in [("2", "product 2 next"), ("3", "waiting before it: 1")] {
+    for (product, turn) in [("2", "goods 2 next"), ("3", "waiting before it: 1")] {
         let taken = domain.run(&["fetch", product]);
         let said = String::from_utf8_lossy(&taken.stdout).into_owned();
         assert!(

@@ -48,7 +48,7 @@ fn robot(domain: &Domain, flags: &[&str]) -> Running {
     let up = domain.start(&[&args[..], &["screws"], flags].concat());
     wait_for("an order under way", || {
         let listed = said(&domain.run(&["queue"]));
-        listed.contains("product 1, under way").then_some(())
+        listed.contains("goods 1, under way").then_some(())
     });
     domain.done(&["stop"]);
     up
@@ -67,17 +67,17 @@ fn goods_are_ordered_by_name_with_a_station_and_without_one() {
         let products = listed.lines().filter_map(|line| line.split_once(": "));
         let products: Vec<_> = products.map(|(_, product)| product).collect();
         let wanted = ["1, under way", "2, waits", "3, waits"];
-        assert_eq!(products, wanted.map(|one| format!("product {one}")));
+        assert_eq!(products, wanted.map(|one| format!("goods {one}")));
 
         for command in [&["fetch"][..], &["queue", "add"]] {
             let refused = domain.run(&[command, &["nails"]].concat());
             let why = said(&refused);
             assert_eq!(refused.status.code(), Some(1), "{why}");
-            assert!(why.contains(&format!("no product nails; {KNOWN}")), "{why}");
+            assert!(why.contains(&format!("no goods nails; {KNOWN}")), "{why}");
         }
         let map = said(&domain.run(&["map"]));
-        assert!(map.contains("product 2 (wood glue): at"), "{map}");
-        assert!(map.contains("product 3: at"), "{map}");
+        assert!(map.contains("goods 2 (wood glue): at"), "{map}");
+        assert!(map.contains("goods 3: at"), "{map}");
         // A stop would outlive the robot, so the test releases it.
         domain.done(&["resume"]);
         drop(up);

@@ -23,7 +23,7 @@ fn waiting(domain: &Domain) -> Vec<(String, String)> {
     let listed = listed(domain);
     let waits = listed.lines().filter(|line| line.ends_with(", waits"));
     let parts = waits.filter_map(|line| {
-        let (id, rest) = line.strip_prefix("order ")?.split_once(": product ")?;
+        let (id, rest) = line.strip_prefix("order ")?.split_once(": goods ")?;
         Some((id.into(), rest.strip_suffix(", waits")?.into()))
     });
     parts.collect()
@@ -40,9 +40,7 @@ fn products(domain: &Domain) -> Vec<String> {
 fn robot(domain: &Domain) -> Running {
     let up = domain.start(&["up", "--headless", "--speed", "4", "--mission", "1"]);
     wait_for("an order under way", || {
-        listed(domain)
-            .ends_with("product 1, under way")
-            .then_some(())
+        listed(domain).ends_with("goods 1, under way").then_some(())
     });
     domain.done(&["stop"]);
     up
@@ -167,11 +165,11 @@ fn what_waits_outlives_up_and_a_script_leaves_it_alone() {
     // The stop has outlived the robot as well, and no waiting order releases it.
     let mut up = domain.start(&["up", "--headless", "--speed", "4"]);
     wait_for("all three to wait", || {
-        (products(&domain) == ["1", "3", "2"] || listed(&domain).contains("product 1, under way"))
+        (products(&domain) == ["1", "3", "2"] || listed(&domain).contains("goods 1, under way"))
             .then_some(())
     });
     wait_for("people to be told", || {
-        let told = "3 orders wait from before, for products 1, 3, 2; `lager queue clear`";
+        let told = "3 orders wait from before, for goods 1, 3, 2; `lager queue clear`";
         up.output().contains(told).then_some(())
     });
     assert!(
@@ -238,11 +236,11 @@ fn delivered_goods_are_shown_as_gone_and_not_fetched_again() {
     // In the simulated world the goods are in another place, and it says so.
     let back = said(&domain.run(&["map", "back", "1"]));
     assert!(
-        back.contains("product 1 is not in its place in the simulated world"),
+        back.contains("goods 1 are not in their place in the simulated world"),
         "{back}"
     );
     let back = said(&domain.run(&["map", "back", "2"]));
-    assert_eq!(back, "nobody has missed product 2");
+    assert_eq!(back, "nobody has missed goods 2");
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(0), "{}", up.log());
 }
@@ -252,8 +250,8 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
     let domain = Domain::new();
     let mut up = robot(&domain);
     for (product, answer) in [
-        ("3", "logic fetches product 3 next"),
-        ("2", "logic fetches product 2; waiting before it: 1"),
+        ("3", "logic fetches goods 3 next"),
+        ("2", "logic fetches goods 2; waiting before it: 1"),
     ] {
         assert_eq!(said(&domain.run(&["queue", "add", product])), answer);
     }
@@ -268,7 +266,7 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
 
     let refused = domain.run(&["queue", "add", "99"]);
     assert!(!refused.status.success());
-    assert!(said(&refused).contains("product 99"), "{}", said(&refused));
+    assert!(said(&refused).contains("goods 99"), "{}", said(&refused));
     let unknown = domain.run(&["queue", "cancel", "7"]);
     assert!(
         said(&unknown).contains("no order 7 waits"),
@@ -286,7 +284,7 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
         up.service("logic").filter(|successor| *successor != logic)
     });
     wait_for("the queue of before", || {
-        let under_way = listed(&domain).contains("product 1, under way");
+        let under_way = listed(&domain).contains("goods 1, under way");
         (under_way && products(&domain) == ["2", "3"]).then_some(())
     });
 
@@ -298,12 +296,12 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
     domain.done(&["cancel", number]);
     let map = said(&domain.run(&["map"]));
     assert!(
-        map.starts_with("2 x 2 squares of 50 cm; delivery at (0, 0)\nproduct 1: "),
+        map.starts_with("2 x 2 squares of 50 cm; delivery at (0, 0)\ngoods 1: "),
         "{map}"
     );
     assert_eq!(listed(&domain), "no order is under way or waits");
     let again = said(&domain.run(&["queue", "add", "2"]));
-    assert_eq!(again, "logic fetches product 2 next");
+    assert_eq!(again, "logic fetches goods 2 next");
     domain.done(&["queue", "add", "1"]);
     domain.done(&["resume"]);
     wait_for("both to be delivered", || {

@@ -413,9 +413,9 @@ fn wrong_usage_ends_with_two_and_a_sentence() {
     lager_tests::lager_bench();
     let domain = Domain::new();
     for (words, sentence) in [
-        (&["up", "--mission", "99"][..], "no product 99"),
+        (&["up", "--mission", "99"][..], "no goods 99"),
         (&["simulate", "--seeds", "3..1"], "first seed comes first"),
-        (&["simulate", "--mission", "99"], "no product 99"),
+        (&["simulate", "--mission", "99"], "no goods 99"),
         (&["drive", "bogus"], "follow-forward"),
         (&["topic", "echo", "sensor/lime"], "sensor/line"),
         (&["fetch", "-1"], "numbered from 0"),

@@ -120,7 +120,7 @@ fn a_station_sees_the_robot_drive_to_what_it_has_ordered() {
     let refused = station.asks("drive 2 200").expect("a reply");
     assert!(refused.is_err(), "logic steers");
     let refused = station.asks("order 3 9").expect("a reply");
-    assert!(refused.unwrap_err().contains("product 9"));
+    assert_eq!(refused.unwrap_err(), "failure_unknown_product 9");
     assert_eq!(station.asks("order 4 1"), Some(Ok(())));
     assert!(station.hears_until("it is on its order", |station| {
         station.number("order") == Some(4) && station.number("product") == Some(1)

@@ -175,7 +175,7 @@ fn a_gag_at_a_station_has_goods_fetched() {
     wait_for("the order to reach logic", || {
         let listed = domain.run(&["queue"]);
         let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
-        listed.contains("product 3").then_some(())
+        listed.contains("goods 3").then_some(())
     });
     // The order survives the death of comm; the robot asks again after its delivery.
     let comm = up.service("comm").expect("it runs");

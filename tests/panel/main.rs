@@ -4,6 +4,7 @@
 mod browser;
 mod driving;
 mod fleet;
+mod health;
 mod manners;
 mod map;
 mod missions;
@@ -95,6 +96,11 @@ each_alone! {
     signals::the_view_of_signals_shows_the_station_s_last_minutes_and_holds_still,
     signals::what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_has_all_frames,
     time::a_past_moment_is_marked_orders_nothing_and_is_the_same_on_another_page,
+    health::a_killed_service_shows_as_died_and_back_with_its_count,
+    health::help_opens_by_key_and_stop_works_over_it,
+    health::the_theme_survives_a_reload_and_is_the_display_s_too,
+    health::what_drives_is_shown_as_pressed,
+    health::a_person_s_name_is_at_the_wheel_and_at_the_stop,
     releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
 }
 

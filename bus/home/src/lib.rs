@@ -5,6 +5,7 @@
 //!
 //! * [`Home`] is the folder. A unit, such as a robot, has a [`UnitName`] and a folder of its own.
 //! * [`Lock`] says which process plays a part. [`Home::up`] says which processes run.
+//! * [`Watched`] is a service that a supervisor keeps alive.
 //! * [`Clock`] shows the unit's time. [`Life`] is a process's sign that it goes on, and [`Chance`]
 //!   says for how much of a silence the process could have run at all.
 //! * [`mend()`] removes the files that killed processes have left. [`Inventory`] notices missing
@@ -24,6 +25,7 @@ mod mend;
 mod name;
 mod presence;
 mod shortage;
+mod watched;
 
 pub use chance::{Chance, ChanceClock};
 pub use changes::BusWatch;
@@ -39,3 +41,4 @@ pub use mend::{Mended, damaged, mend, protect, refuse_foreign, unfinished};
 pub use name::{UnitName, UnitNameError};
 pub use presence::Holder;
 pub use shortage::{SHARED_MEMORY, Shortage};
+pub use watched::Watched;

@@ -15,11 +15,11 @@
 //! assert_eq!(number("12"), Ok(ProductId::new(12).unwrap()));
 //! assert_eq!(
 //!     number("nails").unwrap_err().to_string(),
-//!     "the warehouse has no product nails; it has 7 (screws), 12",
+//!     "the warehouse has no goods nails; it has 7 (screws), 12",
 //! );
 //! assert_eq!(
 //!     "-1".parse::<Called>().unwrap_err().to_string(),
-//!     "-1 is no product's number; products are numbered from 0 to 2147483647",
+//!     "-1 is no number of goods; goods are numbered from 0 to 2147483647",
 //! );
 //! ```
 
@@ -46,7 +46,7 @@ pub enum Called {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CalledError {
     /// It is a number that no product can have.
-    #[error("{text} is no product's number; products are numbered from 0 to 2147483647")]
+    #[error("{text} is no number of goods; goods are numbered from 0 to 2147483647")]
     Number {
         /// The text.
         text: String,
@@ -58,7 +58,7 @@ pub enum CalledError {
 
 /// No product has this name or number.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("the warehouse has no product {called}; it has {known}")]
+#[error("the warehouse has no goods {called}; it has {known}")]
 pub struct UnknownProduct {
     /// The name or number.
     pub called: Called,

@@ -103,6 +103,7 @@
 //!                                      eleven, the leftmost first: what it reads, the least and
 //!                                      the most that it has read, 0 to 255 and higher over tape,
 //!                                      and 1 once that is both floor and tape
+//! health {<key>=<value>}               once a second: machine, services, boards; see `Health`
 //! thinks {<key>=<value>}               the `thought` that follows, in values; see `Thinks`
 //! because <reason>                     why it says the `thought` that follows
 //! thought <text>                       as in the document
@@ -150,6 +151,7 @@
 //! ```
 
 mod fields;
+mod health;
 mod hello;
 mod listed;
 mod order;
@@ -159,6 +161,7 @@ mod state;
 mod thinks;
 
 pub use fields::{Degrees, Loads, Servos};
+pub use health::{Finding, Findings, Health, Release, Service, Services};
 pub use hello::Hello;
 pub use listed::{Block, Listed, Queued};
 pub use order::{ActionError, Order, Spelled};

@@ -1129,7 +1129,7 @@ TOPICS = {
         "nav/map",
         WarehouseMap,
         Qos(8, 1, 10, 74, 100),
-        "The warehouse and where its products stand.",
+        "The warehouse and where its goods stand.",
     ),
     "nav/route": TopicEntry(
         "nav/route",

@@ -152,7 +152,7 @@ topics! {
     Qos::state(16), every 50 ms;
 
     NavMap = "nav/map", WarehouseMap,
-    "The warehouse and where its products stand.",
+    "The warehouse and where its goods stand.",
     Qos::state(8).written_by(4).waking(&[LOGIC]);
 
     NavRoute = "nav/route", Route,

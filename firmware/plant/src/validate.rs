@@ -49,7 +49,7 @@ pub enum WarehouseError {
     },
     /// Two stations on one edge (E17).
     #[error(
-        "products {first} and {second} have their stations on the same edge; at most one station fits between two crossings"
+        "goods {first} and {second} have their stations on the same edge; at most one station fits between two crossings"
     )]
     SharedEdge {
         /// The one listed first.
@@ -59,7 +59,7 @@ pub enum WarehouseError {
     },
     /// Two pieces of goods overlap.
     #[error(
-        "products {first} and {second} would stand {gap_mm} mm apart in one square; goods need 100 mm from middle to middle, so give one of them another square"
+        "goods {first} and {second} would stand {gap_mm} mm apart in one square; goods need 100 mm from middle to middle, so give one of them another square"
     )]
     Crowded {
         /// The one listed first.

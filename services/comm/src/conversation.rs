@@ -334,6 +334,10 @@ impl Conversation {
         match line {
             StationLine::Hello(hello) => {
                 self.freshness.echoed(now, hello.clock_ms);
+                let trip = hello
+                    .clock_ms
+                    .and_then(|sent| now.clock_ms().checked_sub(sent));
+                self.known.trip_ms = trip.and_then(|ms| u32::try_from(ms).ok());
                 if !self.is_extended {
                     self.is_extended = true;
                     self.telling.begin();

@@ -2,12 +2,14 @@
 
 use core::time::Duration;
 
+use lager_home::Watched;
+use lager_lines::extension::Finding;
 use lager_operator::Seen;
 use lager_orders::Mode;
 use lager_stop::Stop;
 use lager_topics::{
-    BlockedWays, DistanceFrame, Durations, Health, LineFrame, NavigatorStatus, OrderQueue, Route,
-    SteeringReport, Truth, WarehouseMap,
+    BlockedWays, BoardHealth, DistanceFrame, Durations, Health, LineFrame, NavigatorStatus,
+    OrderQueue, Route, SteeringReport, Truth, WarehouseMap,
 };
 use lager_wire::Version;
 
@@ -23,6 +25,12 @@ pub(crate) struct Known {
     pub(crate) senses: Senses,
     /// Somebody has told where the robot really is, so there is a simulated world to ask.
     pub(crate) is_simulated: bool,
+    /// When each board was last heard, in ns: sensor, steering.
+    pub(crate) boards_ns: [Option<u64>; 2],
+    /// How long the last sign took to the station and back, in ms.
+    pub(crate) trip_ms: Option<u32>,
+    /// How the machine is.
+    pub(crate) machine: Machine,
     /// The warehouse that this process or an earlier one has published.
     pub(crate) map: Option<Box<WarehouseMap>>,
 }
@@ -54,7 +62,34 @@ pub struct Senses {
     pub truth: Option<Box<Truth>>,
 }
 
+/// How the robot's machine and its services are, at one moment.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Machine {
+    /// How many processes want a core, in percent of the cores; `None` is not known.
+    pub load_percent: Option<u32>,
+    /// All its memory and what programs can still get, in MiB.
+    pub memory_mib: Option<[u32; 2]>,
+    /// The services that `lager up` keeps alive.
+    pub services: Vec<Watched>,
+    /// What is wrong with the machine.
+    pub found: Vec<Finding>,
+}
+
 impl Known {
+    /// Takes the bridge's state. Returns the one before it.
+    pub(crate) fn take_health(&mut self, now_ns: u64, health: &Health) -> Option<Health> {
+        let before = self.health.replace(*health);
+        let boards = |health: &Health| [health.sensor, health.steering];
+        for (place, board) in boards(health).iter().enumerate() {
+            let count = |board: &BoardHealth| (board.epoch, board.packets);
+            let was = before.as_ref().map(|before| count(&boards(before)[place]));
+            if board.up != 0 && was != Some(count(board)) {
+                self.boards_ns[place] = Some(now_ns);
+            }
+        }
+        before
+    }
+
     /// Who may drive.
     pub(crate) fn mode(&self) -> Option<Mode> {
         self.health.and_then(|health| health.mode.get())

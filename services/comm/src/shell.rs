@@ -10,7 +10,8 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
-use lager_home::Clock;
+use lager_home::{Clock, Home, UnitName};
+use lager_lines::extension::Finding;
 use lager_lines::{MAX_LINE, Name, to_line};
 use lager_operator::Act;
 use lager_orders::{Code, Moment};
@@ -30,7 +31,7 @@ use crate::asking::Asking;
 use crate::battery::Pack;
 use crate::conversation::Conversation;
 use crate::effect::Effect;
-use crate::known::Senses;
+use crate::known::{Machine, Senses};
 use crate::link::{Link, News, Wanted};
 use crate::lost::LinkLost;
 use crate::telling;
@@ -58,6 +59,8 @@ pub struct CommConfig {
     pub pack: Pack,
     /// Whether to take over the map of an earlier comm.
     pub resume: bool,
+    /// Finds out what is wrong with this machine, in well under a millisecond.
+    pub findings: fn() -> Vec<Finding>,
 }
 
 /// Runs the communication unit until `shutdown` is requested. `watchdog` guards its turns, and ends
@@ -109,6 +112,9 @@ struct Shell {
     conversation: Conversation,
     link: Link,
     stop_word: PathBuf,
+    home: Home,
+    robot: UnitName,
+    findings: fn() -> Vec<Finding>,
 
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
@@ -164,6 +170,9 @@ impl Shell {
             conversation: Conversation::new(config.name.clone(), kept, config.link_lost)
                 .on(config.pack),
             stop_word: bus.home().folder_of(bus.unit()).join(StopPage::FILE),
+            home: bus.home().clone(),
+            robot: bus.unit().clone(),
+            findings: config.findings,
             health: opening.subscriber()?,
             status: opening.subscriber()?,
             queue: opening.subscriber()?,
@@ -256,6 +265,12 @@ impl Shell {
         if self.conversation.is_to_tell(now) {
             // Read this last, so that it is as new as possible.
             self.take_senses();
+            if self.conversation.is_to_tell_health(now) {
+                self.conversation.machine(Machine {
+                    found: (self.findings)(),
+                    ..Machine::look(&self.home, &self.robot)
+                });
+            }
             self.conversation.tell(now);
         }
     }

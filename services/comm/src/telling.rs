@@ -20,10 +20,12 @@ use lager_wire::{Binary, LineBits, LineReading};
 
 use crate::battery::Battery;
 use crate::known::{Known, Senses, Stood};
-use crate::pose;
+use crate::{health, pose};
 
 /// How often the state is told, in ns of real time.
 const PERIOD: u64 = 50_000_000;
+/// How often it is told how machine, services and boards are.
+const HEALTH_PERIOD: u64 = 1_000_000_000;
 
 /// Reports of the steering board that are older than this are left out, in ms of robot time.
 const LATEST_REPORT_MS: u16 = 500;
@@ -32,6 +34,7 @@ const LATEST_REPORT_MS: u16 = 500;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Telling {
     next_ns: u64,
+    next_health_ns: u64,
     route: Option<Report>,
     blocked: Option<Report>,
     queue: Option<Report>,
@@ -53,6 +56,11 @@ impl Telling {
         now.ns >= self.next_ns
     }
 
+    /// Whether it is time for the health again.
+    pub(crate) const fn is_health_due(&self, now: Moment) -> bool {
+        now.ns >= self.next_health_ns
+    }
+
     /// The reports of this moment. Takes measurements out of `known`.
     pub(crate) fn reports(
         &mut self,
@@ -66,6 +74,10 @@ impl Telling {
             self.next_ns = now.ns + PERIOD;
         }
         let mut reports = vec![Report::State(Box::new(state(now, known, battery)))];
+        if self.is_health_due(now) {
+            self.next_health_ns = now.ns + HEALTH_PERIOD;
+            reports.push(health::report(now, known));
+        }
         let Senses {
             truth,
             latency,
@@ -97,7 +109,7 @@ impl Telling {
 }
 
 /// The kinds of reports that replace an earlier one of their kind.
-pub(crate) const KINDS: usize = 9;
+pub(crate) const KINDS: usize = 10;
 
 /// The kind of a report, the first to be sent first; `None` for reports that all count.
 pub(crate) const fn kind(report: &Report) -> Option<usize> {
@@ -111,6 +123,7 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         Report::Sensors(_) => Some(6),
         Report::Obstacles(_) => Some(7),
         Report::Gone(_) => Some(8),
+        Report::Health(_) => Some(9),
         Report::Stopped { .. }
         | Report::Done { .. }
         | Report::Refused { .. }

@@ -340,8 +340,8 @@ pub struct UpArgs {
     /// emulated robot needs no --script
     #[arg(long, help_heading = "Mission")]
     pub script: bool,
-    /// The products that the robot fetches first, by number or name, in this order [default: the
-    /// warehouse's first product; at a station of somebody else, none]
+    /// The goods that the robot fetches first, by number or name, in this order [default: the
+    /// warehouse's first goods; at a station of somebody else, none]
     #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<Called>,
     /// End when the mission is delivered (0) or has failed (3)

@@ -10,6 +10,7 @@ use lager_wake::{GivenUp, Shutdown, Watchdog};
 
 use crate::cli::CommArgs;
 use crate::config::{Config, StationSection};
+use crate::doctor;
 
 /// How long one call into the bus may take, in real time.
 const CALL: Duration = Duration::from_secs(3);
@@ -40,6 +41,7 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
             low_decivolts: joined.logic.low_battery_decivolts,
         },
         resume: args.service.resume,
+        findings: doctor::soon::findings,
     };
     Ok((joined, wanted))
 }

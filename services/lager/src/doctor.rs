@@ -5,6 +5,7 @@
 
 mod ports;
 mod realtime;
+pub mod soon;
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
@@ -209,16 +210,21 @@ fn versions() -> Finding {
     ))
 }
 
+/// How many MiB of shared memory are free.
+fn free_shared_memory() -> rustix::io::Result<u64> {
+    let stat = rustix::fs::statvfs("/dev/shm")?;
+    Ok(stat.f_bavail * stat.f_frsize / (1024 * 1024))
+}
+
 fn shared_memory() -> Finding {
-    let stat = match rustix::fs::statvfs("/dev/shm") {
-        Ok(stat) => stat,
+    let free = match free_shared_memory() {
+        Ok(free) => free,
         Err(error) => {
             return Bad(format!(
                 "/dev/shm cannot be used ({error}); mount a tmpfs there"
             ));
         }
     };
-    let free = stat.f_bavail * stat.f_frsize / (1024 * 1024);
     if free < SHARED_MEMORY_MIB {
         return Bad(format!(
             "/dev/shm has {free} MiB free and a robot needs {SHARED_MEMORY_MIB}; enlarge it (mount -o remount,size=256M /dev/shm; in a container --shm-size=256m)"
@@ -237,8 +243,13 @@ fn tempfile_in(folder: &str) -> std::io::Result<()> {
     fs::remove_file(&path)
 }
 
+/// How many files this process may open, and each that `up` starts.
+fn most_open_files() -> u64 {
+    getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
+}
+
 fn open_files() -> Finding {
-    let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
+    let limit = most_open_files();
     if limit < OPEN_FILES {
         return Hint(format!(
             "a process may open {limit} files; many observers need {OPEN_FILES} (ulimit -n {OPEN_FILES}, or LimitNOFILE= in the unit)"

@@ -66,6 +66,11 @@ impl Load {
         }
     }
 
+    /// How many processes want a core, in percent of the cores.
+    pub fn percent(&self) -> f64 {
+        self.wanting * 100.0 / self.cores as f64
+    }
+
     /// How busy it is, in words.
     pub fn said(&self) -> String {
         let cores = match self.cores {

@@ -304,7 +304,7 @@ impl Whole {
             .delivered()
             .iter()
             .find(|product| !lies_there(**product))
-            .map(|product| format!("product {product} does not lie at the delivery station"))
+            .map(|product| format!("goods {product} do not lie at the delivery station"))
     }
 
     /// Takes the bytes that have arrived at one port.

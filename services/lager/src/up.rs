@@ -308,7 +308,7 @@ pub fn mission(warehouse: &Warehouse, wanted: &[Called]) -> Result<Vec<i32>> {
     let found = found.map_err(|unknown| exit::Usage(format!("--mission: {unknown}")))?;
     if wanted.len() > lager_station::Robot::MOST_PRODUCTS {
         bail!(exit::Usage(format!(
-            "--mission: at most {} products wait in a queue",
+            "--mission: at most {} goods wait in a queue",
             lager_station::Robot::MOST_PRODUCTS
         )));
     }
@@ -316,7 +316,7 @@ pub fn mission(warehouse: &Warehouse, wanted: &[Called]) -> Result<Vec<i32>> {
         let is_it = |id: &ProductId| Some(id) == found.get(place);
         if found[..place].iter().any(is_it) {
             bail!(exit::Usage(format!(
-                "--mission: product {called} is named twice; there is one piece of goods for each number, so each is fetched once"
+                "--mission: goods {called} are named twice; there is one piece of goods for each number, so each is fetched once"
             )));
         }
     }

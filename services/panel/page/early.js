@@ -1,4 +1,5 @@
-// Until the page's script runs, Esc and Space press STOP. It is a form, so a click needs no script at all.
+// What must be there before the page's script runs: STOP's keys and the theme. STOP is a form, so a click needs no
+// script at all.
 
 addEventListener("keydown", (event) => {
   const { key, repeat, target } = event;
@@ -15,3 +16,13 @@ addEventListener("formdata", ({ formData }) => {
   const name = localStorage.getItem("name");
   if (name) formData.set("name", name);
 });
+
+// The theme that was chosen (`theme.js`), also where it is chosen in another window.
+function useTheme() {
+  const { dataset } = document.documentElement;
+  const theme = localStorage.getItem("theme");
+  if (theme === "light" || theme === "dark") dataset.theme = theme;
+  else delete dataset.theme;
+}
+useTheme();
+addEventListener("storage", useTheme);

@@ -8,6 +8,9 @@ import { at, every } from "./parts/at.js";
 import { Bar } from "./bar/bar.js";
 import { choose, named, shown } from "./station/chosen.js";
 import { Driving } from "./drive/drive.js";
+import { Health } from "./health/health.js";
+import { Help } from "./help/help.js";
+import { nameTheme, switchesTheme } from "./help/theme.js";
 import { Fleet } from "./fleet/fleet.js";
 import { ByHand } from "./drive/hand.js";
 import { Line } from "./line/line.js";
@@ -74,7 +77,7 @@ const missions = new Missions(link, {
   past: at("past"), pastOpen: at("past-open"), pastGoods: at("past-goods"), pastTime: at("past-time"), pastTotals: at("past-totals"), history: at("history"),
 }, robot, { offers: offered({ isPast: () => false, robot }), isArmed: () => at("armed").checked, isOpen: () => !at("missions").hidden });
 const arm = new Arm(at("arm-drawing"));
-const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), resume: at("drive-resume") }, robot, now);
+const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), sticks: at("sticks"), resume: at("drive-resume") }, robot, now);
 const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("hand-said"), take: at("hand-now"), leave: at("hand-leave") }, robot, () => act("mode manual"), (...words) => driving.tell(...words));
 const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
 const wheel = new Wheel(link, { button: at("control"), name: at("name") }, robot, driving, where);
@@ -107,6 +110,11 @@ const save = new Save(link, { span: at("save-span"), csv: at("save-csv"), mcap: 
 const timeLine = new TimeLine(link, {
   line: at("time"), slider: at("time-line"), choice: at("time-span"), from: at("time-from"), before: at("time-before"), after: at("time-after"), now: at("time-now"), tag: at("moment"),
 }, { kept, moment, robot });
+const health = new Health(link, {
+  body: at("health"), said: at("health-said"), links: at("health-links"), services: at("health-services"), machine: at("health-machine"), losses: at("health-losses"), versions: at("health-versions"),
+});
+const help = new Help({ dialog: at("help"), body: at("help-body"), open: at("help-open"), close: at("help-close"), legend: at("map-legend") }, () => at("armed").checked);
+switchesTheme(at("theme"));
 
 /**
  * Has the robot in view do something, and tells where one drives why not.
@@ -172,6 +180,8 @@ function show(tab) {
 function words() {
   at("language").textContent = say("language");
   for (const element of every(".driver-only", HTMLElement)) element.toggleAttribute("disabled", !link.mayDrive);
+  nameTheme(at("theme"));
+  if (help.dialog.open) help.write();
 }
 
 link.addEventListener("robots", () => {
@@ -268,6 +278,7 @@ function drawRest(shown, time, seen, then) {
   save.draw(shown);
   notify.draw(time);
   wheel.draw(shown);
+  health.draw(shown, time);
   if (!link.warehouse) put(at("map-said"), say("no_map"));
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }

@@ -16,6 +16,9 @@ const name = () => robot()?.name ?? named();
 const stop = new Stop(link, { form: at("stop-place"), button: at("stop"), said: at("stop-said") }, robot, name);
 let wasStopped = false;
 
+/** How often it is drawn, in ms. */
+const REST_MS = 200;
+
 function picture() {
   const seen = robot();
   const isStopped = seen?.state.stopped === "1";
@@ -25,7 +28,8 @@ function picture() {
   show(face(link, seen, performance.now()), seen);
   put(at("whose"), name() ?? "");
   const { mode } = seen?.state ?? {};
-  put(at("figures"), [mode ? say(`mode_${mode}`) : "", battery(seen?.state ?? {}).words].filter(Boolean).join(" \u00b7 "));
-  requestAnimationFrame(picture);
+  const waits = seen?.queue.length ? say("orders_wait", seen.queue.length) : "";
+  put(at("figures"), [mode ? say(`mode_${mode}`) : "", battery(seen?.state ?? {}).words, waits].filter(Boolean).join(" \u00b7 "));
+  setTimeout(() => requestAnimationFrame(picture), REST_MS);
 }
 requestAnimationFrame(picture);

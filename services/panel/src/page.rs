@@ -301,7 +301,9 @@ mod tests {
         assert!(unknown.is_empty(), "said and not in the table: {unknown:?}");
         // Others stand in lists and in names that are put together.
         let everything: String = FILES.iter().map(|(.., content)| *content).collect();
-        let put_together = ["mode_", "did_", "servo_", "board_", "side_"];
+        let put_together = [
+            "mode_", "did_", "servo_", "board_", "side_", "look_", "colour_", "theme_", "mark_",
+        ];
         let unsaid: Vec<_> = known
             .iter()
             .filter(|key| !said.contains(*key))

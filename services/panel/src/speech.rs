@@ -20,9 +20,12 @@
 //! # Panel to page, one or more lines in a message
 //!
 //! ```text
-//! you <name> driver|viewer          what this page is called and may do; the first line. A person
-//!                                   asks for a name by the socket's address (`/live?name=Anna`)
-//! time <ms>                         the station's clock, in ms since 1970; first, and after `here`
+//! you <name> driver|viewer <release>
+//!                                   what this page is called and may do, and the release of this
+//!                                   program; the first line. A person asks for a name by the socket's
+//!                                   address (`/live?name=Anna`)
+//! time <ms> [<here>]                the station's clock, in ms since 1970, first and after each `here`,
+//!                                   which it then repeats, so that the page knows its round trip
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
 //! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>

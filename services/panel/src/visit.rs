@@ -51,8 +51,8 @@ pub(crate) struct Visit {
     warehouse: Option<Option<Warehouse>>,
     revision: Option<u64>,
     about: Instant,
-    /// Whether the page is to be told the station's time.
-    wants_time: bool,
+    /// What follows the station's time in the line that is due, if one is.
+    wants_time: Option<String>,
     stayed: Instant,
     there: bool,
     unread: u32,
@@ -62,7 +62,12 @@ impl Visit {
     pub(crate) fn new(page: OpenPage, rank: Rank) -> Self {
         let now = Instant::now();
         Self {
-            lines: format!("you {} {}\n", page.name, rank.as_str()),
+            lines: format!(
+                "you {} {} {}\n",
+                page.name,
+                rank.as_str(),
+                env!("CARGO_PKG_VERSION")
+            ),
             subscription: page.shared.handle.recall(),
             began: page.shared.handle.now(),
             page,
@@ -76,7 +81,7 @@ impl Visit {
             warehouse: None,
             revision: None,
             about: now,
-            wants_time: true,
+            wants_time: Some(String::new()),
             stayed: now,
             there: true,
             unread: 0,
@@ -120,7 +125,7 @@ impl Visit {
         }
         if let Said::Here { said_ms } = said {
             self.late.hear(said_ms, handle.now());
-            self.wants_time = true;
+            self.wants_time = Some(format!(" {said_ms}"));
             return;
         }
         let (Said::Do { number, .. }
@@ -285,8 +290,8 @@ impl Visit {
 
     /// The news that the page has not been told yet.
     pub(crate) fn news(&mut self) -> String {
-        if std::mem::take(&mut self.wants_time) {
-            let _ = writeln!(self.lines, "time {}", History::now_ms());
+        if let Some(here) = self.wants_time.take() {
+            let _ = writeln!(self.lines, "time {}{here}", History::now_ms());
         }
         self.take_answers();
         self.take_asked();

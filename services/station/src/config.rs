@@ -96,7 +96,7 @@ pub enum ServerError {
         why: UnknownProduct,
     },
     /// A robot cannot be told to fetch that.
-    #[error("robot {robot} is not told to fetch product {product}: {why}")]
+    #[error("robot {robot} is not told to fetch goods {product}: {why}")]
     Fetch {
         /// Which.
         robot: Name,

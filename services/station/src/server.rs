@@ -538,10 +538,10 @@ fn put_back(station: &mut Station, queues: &Queues) {
                     let put = station.fetch(&name, product);
                     put.map_err(|error| error.to_string())
                 }
-                _ => Err("there is no such robot or product".into()),
+                _ => Err("there is no such robot, or no such goods".into()),
             };
             if let Err(why) = put {
-                tracing::warn!("robot {name} does not fetch product {product} any more: {why}");
+                tracing::warn!("robot {name} does not fetch goods {product} any more: {why}");
             }
         }
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use lager_floor::{Node, Place, ProductId};
 use lager_lines::Text;
 use lager_lines::extension::{
-    Block, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
+    Block, Event, Health, Latency, Listed, Queued, Report, State, Thinks, TruePose,
 };
 use lager_orders::Reason;
 use lager_wire::LineReading;
@@ -48,6 +48,8 @@ pub struct Shown {
     pub latency: Option<Dated<Box<Latency>>>,
     /// What each line sensor read in the last calibration, the leftmost first.
     pub sensors: Option<Dated<[LineReading; 11]>>,
+    /// How its machine, its services and its boards are, once a second.
+    pub health: Option<Dated<Box<Health>>>,
 }
 
 /// What became of an action or of a stop.
@@ -137,7 +139,7 @@ impl Saying {
 /// What somebody has been told of a robot's [`Shown`], as the times of the last reports.
 #[derive(Clone, Debug, Default)]
 pub struct LastTold {
-    at: [Option<Duration>; 9],
+    at: [Option<Duration>; 10],
 }
 
 impl LastTold {
@@ -168,6 +170,7 @@ impl LastTold {
             sensors => Report::Sensors,
             obstacles => Report::Obstacles,
             gone => Report::Gone,
+            health => Report::Health,
         }
         newer
     }
@@ -186,6 +189,7 @@ impl Shown {
             Report::Gone(value) => self.gone = Some(Dated { value, at }),
             Report::Latency(value) => self.latency = Some(Dated { value, at }),
             Report::Sensors(value) => self.sensors = Some(Dated { value, at }),
+            Report::Health(value) => self.health = Some(Dated { value, at }),
             Report::Obstacles(value) => self.obstacles = Some(Dated { value, at }),
             Report::Past { ago_ms, report } => {
                 let ago = Duration::from_millis(ago_ms);

@@ -20,7 +20,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lager_home::{ChanceClock, Clock};
+use lager_home::{ChanceClock, Clock, Watched};
 use lager_wake::Shutdown;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{MemfdFlags, memfd_create};
@@ -80,9 +80,8 @@ pub struct Children {
     config: String,
     parent: Parent,
     processes: Vec<Process>,
-    /// The services that have ever been started.
-    known: Vec<Service>,
-    restarts: u32,
+    /// The services that have ever been started, and how often each was started again.
+    known: Vec<(Service, u32)>,
     /// The times of restarts count from here.
     began: Instant,
 }
@@ -98,6 +97,8 @@ pub struct Children {
 struct Process {
     service: Service,
     running: Option<Running>,
+    /// When it was started, or when it ended, in ns of `CLOCK_MONOTONIC`.
+    since_ns: u64,
     backoff: Backoff,
 }
 
@@ -155,16 +156,15 @@ impl Children {
             },
             processes: Vec::new(),
             known: Vec::new(),
-            restarts: 0,
             began: Instant::now(),
         }
     }
 
     /// Starts `service`, for the first time or again, and returns its process.
     pub fn start(&mut self, service: Service, start: Start) -> Result<u32> {
-        match self.known.contains(&service) {
-            true => self.restarts += 1,
-            false => self.known.push(service),
+        match self.known.iter_mut().find(|(known, _)| *known == service) {
+            Some((_, restarts)) => *restarts += 1,
+            None => self.known.push((service, 0)),
         }
         let place = self
             .processes
@@ -236,6 +236,20 @@ impl Children {
         self.processes.iter().filter_map(id)
     }
 
+    /// How each service is, in the order in which they were first started.
+    pub fn watched(&self) -> Vec<Watched> {
+        let watched = |(service, restarts): &(Service, u32)| {
+            let process = self.processes.iter().find(|each| each.service == *service);
+            Watched {
+                name: service.command().to_owned(),
+                pid: self.process(*service),
+                since_ns: process.map_or(0, |process| process.since_ns),
+                restarts: *restarts,
+            }
+        };
+        self.known.iter().map(watched).collect()
+    }
+
     /// Kills a service that does not answer. The next [`reap`](Self::reap) finds its end.
     pub fn kill(&mut self, service: Service) {
         let mut processes = self.processes.iter_mut();
@@ -279,7 +293,7 @@ impl Children {
 
     /// How many restarts there were in all.
     pub fn restarts(&self) -> u32 {
-        self.restarts
+        self.known.iter().map(|(_, restarts)| restarts).sum()
     }
 
     /// Ends every child with SIGTERM, one after the other, the last started first, and forgets
@@ -349,6 +363,7 @@ impl Process {
         Self {
             service,
             running: None,
+            since_ns: Clock::monotonic_ns(),
             backoff: Backoff::default(),
         }
     }
@@ -356,6 +371,7 @@ impl Process {
     /// A child has just ended.
     fn ended(&mut self, now: Duration, by_itself: bool) {
         let running = self.running.take();
+        self.since_ns = Clock::monotonic_ns();
         let lived = running.map_or(Duration::ZERO, |running| running.started.elapsed());
         self.backoff.ended(now, lived, by_itself);
     }
@@ -381,6 +397,7 @@ impl Process {
         let child = attempt().with_context(|| format!("cannot start the service `{name}`"))?;
         let pid = child.id();
         tracing::info!(service = name, pid, "started");
+        self.since_ns = Clock::monotonic_ns();
         self.running = Some(Running {
             end: pidfd_open(Pid::from_child(&child), PidfdFlags::empty()).ok(),
             child,

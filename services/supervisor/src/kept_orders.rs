@@ -125,10 +125,10 @@ impl KeptOrders {
         match &products[..] {
             [] => None,
             [product] => Some(format!(
-                "1 order waits from before, for product {product}; `lager queue clear` takes it back"
+                "1 order waits from before, for goods {product}; `lager queue clear` takes it back"
             )),
             all => Some(format!(
-                "{} orders wait from before, for products {}; `lager queue clear` takes them back",
+                "{} orders wait from before, for goods {}; `lager queue clear` takes them back",
                 all.len(),
                 all.join(", ")
             )),
@@ -409,7 +409,7 @@ mod tests {
         assert_eq!(all.add(&many), (32..=40).collect::<Vec<_>>());
         let said = kept(&[(7, 3), (8, 1)], &[]).sentence().unwrap();
         assert!(
-            said.starts_with("2 orders wait from before, for products 3, 1;"),
+            said.starts_with("2 orders wait from before, for goods 3, 1;"),
             "{said}"
         );
     }

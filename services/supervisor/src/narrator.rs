@@ -254,7 +254,7 @@ impl Narrator {
             Some(Phase::Driving) => format!("drives from {place}"),
             Some(Phase::Turning) => format!("turns at {place}"),
             Some(Phase::Approaching) => format!(
-                "looks for the station of product {} from {place}",
+                "looks for the station of goods {} from {place}",
                 status.product
             ),
             Some(Phase::Positioning) => "turns in to the station".into(),
@@ -265,7 +265,7 @@ impl Narrator {
             }
             Some(Phase::Leaving) => format!("leaves the station with goods {}", status.product),
             Some(Phase::Exiting) => "follows the line to the delivery station".into(),
-            Some(Phase::Dropping) => format!("lays down product {}", status.product),
+            Some(Phase::Dropping) => format!("lays down goods {}", status.product),
             Some(Phase::BackingOff) => "backs off from the delivery station".into(),
             Some(Phase::TurningRound) => "turns round".into(),
             Some(Phase::Returning) => "returns to the warehouse".into(),
@@ -355,14 +355,14 @@ mod tests {
         let mut lines = 0;
         // Two sentences five times a second, for a minute.
         for turn in 0..300 {
-            lines += usize::from(told.is_new(at(turn * 200), "robot", "does not have product 1"));
+            lines += usize::from(told.is_new(at(turn * 200), "robot", "does not have goods 1"));
             lines += usize::from(told.is_new(at(turn * 200), "logic", "\"the claw is empty\""));
         }
         assert_eq!(lines, 2);
-        assert!(told.is_new(at(60_000), "robot", "does not have product 2"));
-        assert!(told.is_new(at(60_000), "logic", "does not have product 2"));
+        assert!(told.is_new(at(60_000), "robot", "does not have goods 2"));
+        assert!(told.is_new(at(60_000), "logic", "does not have goods 2"));
         let later = at(60_000) + TOLD + TOLD;
-        assert!(told.is_new(later, "robot", "does not have product 1"));
+        assert!(told.is_new(later, "robot", "does not have goods 1"));
         assert_eq!(told.lines.len(), 1, "nothing is kept for ever");
     }
 }

@@ -14,7 +14,7 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
-use lager_home::{ChanceClock, LockError};
+use lager_home::{ChanceClock, LockError, Watched};
 use lager_ports::BusConfig;
 
 use crate::children::{Children, PATIENCE, Start};
@@ -81,6 +81,8 @@ pub struct Robot {
     body: Option<ChanceClock>,
     began: Instant,
     folder_looked: Instant,
+    /// What others were told last of the services.
+    told: Vec<Watched>,
 }
 
 impl Robot {
@@ -115,6 +117,7 @@ impl Robot {
             body: None,
             began: now,
             folder_looked: now,
+            told: Vec::new(),
         })
     }
 
@@ -130,6 +133,7 @@ impl Robot {
         self.carry_out(steps)?;
         while !self.signals.end_asked() {
             self.turn()?;
+            self.tell_services();
             let ended = self.plan.mission.outcome().is_some();
             let over = ended || self.children.hopeless().is_some();
             // Clear a damaged bus before the end, too.
@@ -160,7 +164,7 @@ impl Robot {
                 None => "interrupted before the mission was delivered".into(),
             }),
             _ => (self.misplaced.first())
-                .map(|product| format!("product {product} does not lie at the delivery station")),
+                .map(|product| format!("goods {product} do not lie at the delivery station")),
         };
         let report = MissionReport {
             delivered: mission.delivered().to_vec(),
@@ -208,6 +212,15 @@ impl Robot {
             self.happened(Event::Due(service))?;
         }
         Ok(())
+    }
+
+    /// Tells others how the services are, when that has changed.
+    fn tell_services(&mut self) {
+        let services = self.children.watched();
+        if services != self.told {
+            self.lock.tell(&services);
+            self.told = services;
+        }
     }
 
     fn happened(&mut self, event: Event) -> Result<()> {
@@ -262,6 +275,7 @@ impl Robot {
             }
             return self.happened(Event::Damaged(format!("{error:#}")));
         }
+        self.told.clear();
         // Nobody knows the robot's orders any more, and a simulated world is a new one.
         keeping.begin_again();
         self.happened(Event::Restored)

@@ -9,7 +9,7 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use lager_home::{Home, Life, Lock, UnitName};
+use lager_home::{Home, Life, Lock, UnitName, Watched};
 use lager_lines::secret::Secret;
 use lager_ports::BusConfig;
 use lager_stop::{StopPage, StopWord};
@@ -152,6 +152,7 @@ impl RuntimeFolder {
         Ok(NameLock {
             lock: Some(self.place.lock_name(&self.robot)?),
             place: self.place.clone(),
+            robot: self.robot.clone(),
             folder: self.path.clone(),
             secret: None,
         })
@@ -163,6 +164,7 @@ impl RuntimeFolder {
 pub struct NameLock {
     lock: Option<Lock>,
     place: Home,
+    robot: UnitName,
     folder: PathBuf,
     /// The files for a station of the robot's own.
     secret: Option<Secret>,
@@ -190,6 +192,13 @@ impl NameLock {
     pub fn renew(&self) {
         if let Some(lock) = &self.lock {
             lock.renew();
+        }
+    }
+
+    /// Tells others how the services are. If a write fails, they read the next one.
+    pub fn tell(&self, services: &[Watched]) {
+        if self.is_held() {
+            let _ = self.place.write_watched(&self.robot, services);
         }
     }
 
@@ -225,6 +234,7 @@ impl Drop for NameLock {
             for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, QUEUE, SECRET] {
                 let _ = fs::remove_file(self.folder.join(name));
             }
+            self.place.forget_watched(&self.robot);
             // It stays if there is something in it.
             let _ = fs::remove_dir(self.folder.join(EEPROM));
             StopWord::tidy(&self.folder.join(StopPage::FILE));

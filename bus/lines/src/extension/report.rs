@@ -7,6 +7,7 @@ use lager_orders::{EventKind, Reason};
 use lager_wire::LineReading;
 
 use super::fields::Degrees;
+use super::health::Health;
 use super::listed::{Block, Listed, Queued};
 use super::order::number;
 use super::state::State;
@@ -70,6 +71,8 @@ pub enum Report {
     Truth(TruePose),
     /// What each line sensor has read in the calibration that runs, the leftmost first.
     Sensors([LineReading; 11]),
+    /// How its machine, its services and its boards are.
+    Health(Box<Health>),
 }
 
 /// What has happened on a mission (C8).
@@ -212,6 +215,7 @@ impl Report {
                 })
             },
             "state" => |reader: &mut Reader<'_>| Ok(Self::State(Box::new(State::read(reader)?))),
+            "health" => |reader: &mut Reader<'_>| Ok(Self::Health(Box::new(Health::read(reader)?))),
             "thinks" => |reader: &mut Reader<'_>| Ok(Self::Thinks(Box::new(Thinks::read(reader)?))),
             "because" => |reader: &mut Reader<'_>| read_reason(reader).map(Self::Because),
             "route" => |reader: &mut Reader<'_>| Ok(Self::Route(Listed::<Node>::read(reader)?)),
@@ -375,6 +379,7 @@ impl fmt::Display for Report {
             Self::Thinks(thinks) => write!(formatter, "thinks{thinks}"),
             Self::Because(reason) => write!(formatter, "because {}", reason.as_str()),
             Self::Latency(latency) => write!(formatter, "latency {latency}"),
+            Self::Health(health) => write!(formatter, "health{health}"),
             Self::Truth(truth) => write!(formatter, "truth {truth}"),
             Self::Sensors(sensors) => {
                 formatter.write_str("sensors")?;

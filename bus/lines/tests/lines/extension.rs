@@ -3,7 +3,8 @@
 use lager_floor::{Heading, Node, Place, ProductId};
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Block, Degrees, Hello, Listed, Loads, Order, Queued, Report, Servos, State,
+    Block, Degrees, Finding, Findings, Health, Hello, Listed, Loads, Order, Queued, Release,
+    Report, Service, Services, Servos, State,
 };
 use lager_lines::{Name, to_line};
 use lager_orders::{Action, LeaseMs, Mode, Pick};
@@ -77,6 +78,10 @@ fn every_line_of_the_robot_is_read_and_written() {
         "event failed 1 0 - - I have lost the line",
         "latency 0",
         "latency 4294967295 0 1 30 400 89 999999",
+        "health",
+        "health release=0.1.0 load_percent=37 cores=4 memory_mib=3794 memory_free_mib=2100 trip_ms=2",
+        "health sensor_age_ms=3 steering_version=1 services=bridge:up:812:0,logic:down:0:2",
+        "health services= found=shared_memory:12,overload:310",
         "truth -35 2147483647 359 -",
         "truth 0 0 0 7",
         SENSORS,
@@ -166,6 +171,64 @@ fn the_fullest_state_fits_in_a_line() {
     let line = to_line(&Report::State(Box::new(full.clone()))).expect("it fits");
     let read = Report::read(line.trim_end());
     assert_eq!(read, Some(Ok(Report::State(Box::new(full)))));
+}
+
+#[test]
+fn the_fullest_health_fits_in_a_line() {
+    let name = Name::new("x".repeat(Name::MAX_LENGTH)).expect("a name");
+    let service = Service {
+        name: name.clone(),
+        is_up: false,
+        since_s: u32::MAX,
+        restarts: u32::MAX,
+    };
+    let finding = Finding {
+        code: name,
+        seen: u32::MAX,
+    };
+    let (count, small) = (Some(u32::MAX), Some(255));
+    let full = Health {
+        release: Some(Release([u16::MAX; 3])),
+        load_percent: count,
+        cores: Some(u16::MAX),
+        memory_mib: count,
+        memory_free_mib: count,
+        trip_ms: count,
+        sensor_age_ms: count,
+        steering_age_ms: count,
+        sensor_version: small,
+        steering_version: small,
+        sensor_restarts: count,
+        steering_restarts: count,
+        sensor_damaged: count,
+        steering_damaged: count,
+        services: Some(Services::new(vec![service; Services::FIT + 1])),
+        found: Some(Findings::new(vec![finding; Findings::FIT + 1])),
+    };
+    let line = to_line(&Report::Health(Box::new(full.clone()))).expect("it fits");
+    assert_eq!(
+        Report::read(line.trim_end()),
+        Some(Ok(Report::Health(Box::new(full))))
+    );
+}
+
+#[test]
+fn a_health_that_is_misspelt_is_refused() {
+    for line in [
+        "health release=0.1",
+        "health release=0.1.0-dev",
+        "health services=bridge:up:1",
+        "health services=bridge:well:1:0",
+        "health services=bridge:up:1:0:9",
+        "health services=bridge:up:1:0,",
+        "health found=shared_memory",
+        "health found=shared_memory:-1",
+    ] {
+        assert!(
+            Report::read(line).is_some_and(|read| read.is_err()),
+            "{line}"
+        );
+    }
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use lager_floor::{Grid, Heading, Node, Place, Product, ProductId, SideLength};
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Block, Degrees, Event, Happened, Hello, Latency, Listed, Loads, Order, Queued, Report, Servos,
-    State, Thinks, TruePose,
+    Block, Degrees, Event, Finding, Findings, Happened, Health, Hello, Latency, Listed, Loads,
+    Order, Queued, Release, Report, Service, Services, Servos, State, Thinks, TruePose,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
@@ -205,6 +205,32 @@ prop_compose! {
 }
 
 prop_compose! {
+    fn service()(
+        name in name(), is_up in any::<bool>(), since_s in any::<u32>(), restarts in any::<u32>(),
+    ) -> Service {
+        Service { name, is_up, since_s, restarts }
+    }
+}
+
+prop_compose! {
+    fn health()(
+        release in of(any::<[u16; 3]>()), load_percent in of(any::<u32>()),
+        cores in of(any::<u16>()), trip_ms in of(any::<u32>()),
+        sensor_version in of(any::<u8>()), steering_damaged in of(any::<u32>()),
+        services in of(prop::collection::vec(service(), 0..10)),
+        found in of(prop::collection::vec((name(), any::<u32>()), 0..7)),
+    ) -> Health {
+        let finding = |(code, seen)| Finding { code, seen };
+        Health {
+            release: release.map(Release), load_percent, cores, trip_ms, sensor_version,
+            steering_damaged, services: services.map(Services::new),
+            found: found.map(|all| Findings::new(all.into_iter().map(finding))),
+            ..Health::default()
+        }
+    }
+}
+
+prop_compose! {
     fn state()(
         work in trouble(), bits in of(any::<u16>()), line_error in of(any::<i8>()),
         distance_cm in of(any::<u8>()), left_duty in of(any::<u8>()),
@@ -272,6 +298,7 @@ fn report() -> impl Strategy<Value = Report> {
         }),
         state().prop_map(|state| Report::State(Box::new(state))),
         thinks().prop_map(|thinks| Report::Thinks(Box::new(thinks))),
+        health().prop_map(|health| Report::Health(Box::new(health))),
         prop::collection::vec(coord(), many.clone())
             .prop_map(|all| Report::Route(Listed::<Node>::new(&all))),
         prop::collection::vec(block(), many.clone())

@@ -13,13 +13,14 @@ use lager_topics::{
 };
 
 use super::{AGAIN, Asker, Conversation, STOPPED, UNTOLD};
+use crate::known::Machine;
 use crate::known::{Senses, Stood};
 use crate::{speech, telling};
 
 impl Conversation {
     /// The bridge says who may steer.
     pub fn health(&mut self, now: Moment, health: &Health) {
-        let before = self.known.health.replace(*health);
+        let before = self.known.take_health(now.ns, health);
         self.note(now, before.as_ref(), health);
         let mode_before = before.and_then(|before| before.mode.get());
         if self.known.mode() != mode_before {
@@ -139,6 +140,11 @@ impl Conversation {
         known.blocks = new.blocks.or_else(|| known.blocks.take());
         known.latency = new.latency.or_else(|| known.latency.take());
         known.truth = new.truth.or_else(|| known.truth.take());
+    }
+
+    /// How the machine is; a second later somebody asks again.
+    pub fn machine(&mut self, machine: Machine) {
+        self.known.machine = machine;
     }
 
     /// A service has thought something.

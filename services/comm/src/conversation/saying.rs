@@ -49,6 +49,11 @@ impl Conversation {
         self.is_up && self.is_extended && self.telling.is_due(now)
     }
 
+    /// Whether that station will be told how the machine is.
+    pub fn is_to_tell_health(&self, now: Moment) -> bool {
+        self.is_to_tell(now) && self.telling.is_health_due(now)
+    }
+
     /// Tells the state as it is known now.
     pub fn tell(&mut self, now: Moment) {
         if self.is_to_tell(now) {

@@ -15,12 +15,12 @@ use super::values;
 pub enum Ordered {
     #[command(flatten)]
     Plain(Plain),
-    /// Order the robot to fetch and deliver a product
+    /// Order the robot to fetch and deliver goods
     #[command(after_help = "Examples:
   lager fetch 3               the product with this number
   lager fetch screws          the one with this name; `lager map` shows both")]
     Fetch {
-        /// The product's number, or its name in the warehouse's file
+        /// The number of the goods, or their name in the warehouse's file
         #[arg(allow_negative_numbers = true, value_parser = values::product)]
         product: Called,
     },
@@ -35,8 +35,8 @@ pub enum Ordered {
     },
     /// Show the warehouse, its goods and the blocked ways, or say that goods are back
     #[command(after_help = "Examples:
-  lager map                   the floor, where each product stands, and what is in the way
-  lager map back 3            product 3, which was delivered, is in its place again
+  lager map                   the floor, where all goods stand, and what is in the way
+  lager map back 3            goods 3, which were delivered, are in their place again
   lager map back              so are all goods
 
 The robot remembers which goods it has delivered or has not found in their place, and refuses to
@@ -49,7 +49,7 @@ fetch them until they are back.")]
     /// Show the orders, or add, cancel or move one
     #[command(after_help = "Examples:
   lager queue                 the orders with their numbers, the next one first
-  lager queue add 3           fetch product 3 after all the others, once the robot is autonomous
+  lager queue add 3           fetch goods 3 after all the others, once the robot is autonomous
   lager queue up 4711         carry order 4711 out before the one that stands before it
   lager queue cancel 4711     take it back
 
@@ -110,7 +110,7 @@ pub enum Plain {
         #[arg(value_parser = values::mode())]
         mode: Mode,
     },
-    /// Tell the robot that you have picked the product up
+    /// Tell the robot that you have picked the goods up
     Picked {
         /// The robot believes it even if the claw feels nothing or the arm is not in its carry pose
         #[arg(long)]
@@ -160,7 +160,7 @@ impl Plain {
             Self::Mode {
                 mode: Mode::Autonomous,
             } => "logic steers",
-            Self::Picked { .. } => "the robot takes the product to delivery",
+            Self::Picked { .. } => "the robot takes the goods to delivery",
             Self::Pick { by: Pick::Manual } => "a person picks the goods up",
             Self::Pick { by: Pick::Auto } => "the robot picks the goods up by itself",
             Self::Reset => "the robot now counts as standing on the delivery node",
@@ -205,7 +205,7 @@ pub enum ObstacleChange {
 pub enum MapChange {
     /// Say that goods are in their place again
     Back {
-        /// The product's number, or its name in the warehouse's file [default: all goods]
+        /// The number of the goods, or their name in the warehouse's file [default: all goods]
         #[arg(allow_negative_numbers = true, value_parser = values::product)]
         product: Option<Called>,
     },
@@ -214,9 +214,9 @@ pub enum MapChange {
 /// What a person changes about the waiting orders.
 #[derive(Debug, Subcommand)]
 pub enum QueueChange {
-    /// Add an order for a product at the end
+    /// Add an order for goods at the end
     Add {
-        /// The product's number, or its name in the warehouse's file
+        /// The number of the goods, or their name in the warehouse's file
         #[arg(allow_negative_numbers = true, value_parser = values::product)]
         product: Called,
     },

@@ -16,7 +16,7 @@ pub struct SimulateArgs {
     /// Built-in warehouse, or file of a warehouse; may be given several times
     #[arg(long, value_name = "FILE", help_heading = "Mission")]
     pub warehouse: Vec<String>,
-    /// The products to fetch, by number or name, in this order [default: the first of the
+    /// The goods to fetch, by number or name, in this order [default: the first of the
     /// warehouse]
     #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<Called>,

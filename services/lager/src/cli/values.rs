@@ -36,13 +36,13 @@ const RATES: RangeInclusive<f64> = 0.01..=100.0;
 pub struct Fetch {
     /// Which robot.
     pub robot: Name,
-    /// Which products, in this order.
+    /// Which goods, in this order.
     pub products: Vec<Called>,
 }
 
-/// A robot and the products that it has to fetch.
+/// A robot and the goods that it has to fetch.
 pub fn fetch(text: &str) -> Result<Fetch, String> {
-    let usage = || format!("`{text}` is no order; write a robot and its products, as in r1=3,1");
+    let usage = || format!("`{text}` is no order; write a robot and its goods, as in r1=3,1");
     let (robot, products) = text.split_once('=').ok_or_else(usage)?;
     let robot = Name::new(robot).map_err(|error| error.to_string())?;
     let products: Result<_, String> = products.split(',').map(product).collect();

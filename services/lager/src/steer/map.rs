@@ -51,7 +51,7 @@ impl Operator {
         match away {
             None => Ok(()),
             Some(good) => bail!(
-                "product {} is not in its place in the simulated world, where nobody puts it back; \
+                "goods {} are not in their place in the simulated world, where nobody puts it back; \
                  all goods are there when `lager up` is started again",
                 good.id
             ),
@@ -96,7 +96,7 @@ fn described(
         };
         let _ = write!(
             text,
-            "\nproduct {id}{name}: at the {side} of square ({x}, {y}){gone}"
+            "\ngoods {id}{name}: at the {side} of square ({x}, {y}){gone}"
         );
     }
     for way in ways.ways() {
@@ -156,7 +156,7 @@ mod tests {
             ..MapProduct::default()
         };
         let floor = "2 x 1 squares of 50 cm; delivery at (0, 0)\n\
-                     product 7: at the upper side of square (1, 0)\n";
+                     goods 7: at the upper side of square (1, 0)\n";
         let mut ways = BlockedWays::default();
         let told = described(&map, &ways, &[], None);
         assert_eq!(told, format!("{floor}no way is blocked"));
@@ -171,7 +171,7 @@ mod tests {
                      square = [1, 0]\nside = \"up\"";
         let names: Warehouse = toml::from_str(names).expect("a warehouse");
         let told = described(&map, &ways, &[], Some(&names));
-        assert!(told.contains("\nproduct 7 (screws): at"), "{told}");
+        assert!(told.contains("\ngoods 7 (screws): at"), "{told}");
         ways.count = 1;
         ways.ways[0] = BlockedWay {
             x: 2,

@@ -137,11 +137,11 @@ impl Operator {
         let queue = seen.queue.unwrap_or_default();
         Ok(match action {
             Action::Add { order, product } => match self.queue()?.before(order) {
-                Ok(0) => format!("logic fetches product {product} next"),
+                Ok(0) => format!("logic fetches goods {product} next"),
                 Ok(before) => {
-                    format!("logic fetches product {product}; waiting before it: {before}")
+                    format!("logic fetches goods {product}; waiting before it: {before}")
                 }
-                Err(_) => format!("logic fetches product {product}"),
+                Err(_) => format!("logic fetches goods {product}"),
             },
             Action::Cancel { order } => format!("order {order} is taken back"),
             Action::Up { order } if queue.before(order) == Ok(0) => {
@@ -153,8 +153,8 @@ impl Operator {
             Action::Clear if queue.orders().is_empty() => "no order waits".into(),
             Action::Clear => "all waiting orders are taken back".into(),
             Action::Back { product } => match (product, queue.is_gone(product)) {
-                (Some(product), true) => format!("product {product} is in its place again"),
-                (Some(product), false) => format!("nobody has missed product {product}"),
+                (Some(product), true) => format!("goods {product} are in their place again"),
+                (Some(product), false) => format!("nobody has missed goods {product}"),
                 (None, true) => "all goods are in their places again".into(),
                 (None, false) => "no goods are missed".into(),
             },
@@ -178,7 +178,7 @@ impl Operator {
         };
         Ok(match (action, why.code()) {
             (Action::Add { product, .. }, _) => {
-                format!("logic refuses to fetch product {product}: {}", hinted(why))
+                format!("logic refuses to fetch goods {product}: {}", hinted(why))
             }
             (Action::Picked { .. }, code) if code.starts_with("failure_") => {
                 format!("logic refuses to leave: {why}; `lager picked --force` overrules it")

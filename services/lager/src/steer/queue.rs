@@ -26,18 +26,14 @@ fn listed(queue: &OrderQueue) -> String {
     // Writing to a String cannot fail.
     if queue.under_way != 0 {
         let (id, product) = (queue.order_id, queue.product);
-        let _ = writeln!(text, "order {id}: product {product}, under way");
+        let _ = writeln!(text, "order {id}: goods {product}, under way");
     }
     for order in queue.orders() {
         let state = match order.put_off {
             0 => "waits",
             _ => "waits for a way",
         };
-        let _ = writeln!(
-            text,
-            "order {}: product {}, {state}",
-            order.id, order.product
-        );
+        let _ = writeln!(text, "order {}: goods {}, {state}", order.id, order.product);
     }
     match text.is_empty() {
         true => "no order is under way or waits".into(),

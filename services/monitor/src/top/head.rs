@@ -138,7 +138,7 @@ impl Head {
         let mut text = format!("{phase} at ({},{})", status.x, status.y);
         let queue = self.queue.unwrap_or_default();
         if queue.under_way != 0 {
-            text += &format!(", order {} product {}", queue.order_id, queue.product);
+            text += &format!(", order {} goods {}", queue.order_id, queue.product);
         }
         text += &format!(", {} waiting, {} delivered", queue.count, status.delivered);
         match status.hold.get() {

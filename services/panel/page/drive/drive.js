@@ -15,6 +15,7 @@
 /** @import { Words } from "../words/words.js" */
 
 import { Pads } from "./pads.js";
+import { drawSticks } from "./sticks.js";
 import { reason } from "../words/sentences.js";
 import { isText } from "../bar/stop.js";
 import { say } from "../words/words.js";
@@ -79,10 +80,20 @@ const STEPS = [
  */
 const SIGNS = { ArrowUp: "\u2191", ArrowDown: "\u2193", ArrowLeft: "\u2190", ArrowRight: "\u2192", PageUp: "PgUp", PageDown: "PgDn" };
 
+/**
+ * Each key that drives or moves the arm, as it is printed, with the word for what it does.
+ *
+ * @type {Record<"wheels" | "arm", [string, string][]>}
+ */
+export const KEYS = {
+  wheels: [...HELD, ...ONCE].flatMap(([, word, [key]]) => (key ? [[SIGNS[key] ?? key, word]] : [])),
+  arm: STEPS.map(([, word, keys]) => [keys.join(" "), word]),
+};
+
 export class Driving {
   /**
    * @param {Link} link
-   * @param {{ armed: HTMLInputElement } & Record<"said" | "pad" | "arm" | "resume", HTMLElement>} parts
+   * @param {{ armed: HTMLInputElement, sticks: SVGElement } & Record<"said" | "pad" | "arm" | "resume", HTMLElement>} parts
    * @param {() => Robot | null} robot
    * @param {() => number} now
    */
@@ -188,8 +199,14 @@ export class Driving {
     if (this.held) this.older.push(this.held);
     else this.timer = setInterval(() => this.renew(), RENEW_MS);
     this.held = { code, source, button, robot };
-    button?.classList.add("down");
+    this.press();
     this.renew();
+  }
+
+  /** Shows what is held as pressed, by whatever it is held. */
+  press() {
+    const codes = [this.held, ...this.older].map((held) => `drive ${held?.code}`);
+    for (const button of this.parts.pad.children) button.classList.toggle("down", codes.includes(button.getAttribute("data-action") ?? ""));
   }
 
   async renew() {
@@ -219,7 +236,7 @@ export class Driving {
     const { robot } = this.held;
     this.held = null;
     this.older = [];
-    for (const button of document.querySelectorAll("#pad .down")) button.classList.remove("down");
+    this.press();
     if (this.link.open) this.link.act(robot, `drive ${STAND}`);
     const [word, ...values] = why;
     if (word) this.tell(word, ...values);
@@ -234,14 +251,13 @@ export class Driving {
     if (this.held?.source === source) {
       const before = this.older.pop();
       if (!before) return this.letGo();
-      this.held.button?.classList.remove("down");
       this.held = before;
+      this.press();
       this.renew();
       return;
     }
-    const ended = this.older.find((other) => other.source === source);
-    ended?.button?.classList.remove("down");
-    this.older = this.older.filter((other) => other !== ended);
+    this.older = this.older.filter((other) => other.source !== source);
+    this.press();
   }
 
   /**
@@ -263,7 +279,10 @@ export class Driving {
     this.tell(null);
     if (isStand) return this.hear(await this.link.act(robot, action));
     this.step = robot;
+    const button = document.querySelector(`[data-action="${action}"]`);
+    button?.classList.add("down");
     const answer = await this.link.act(robot, action);
+    button?.classList.remove("down");
     if (this.step === robot) this.step = null;
     this.hear(answer);
   }
@@ -279,10 +298,10 @@ export class Driving {
       const held = HELD.find(([, word]) => word === name);
       const once = ONCE.find(([, word]) => word === name);
       if (held) this.heldButton(pad, held);
-      if (once) addButton(pad, name, once[2]).addEventListener("click", () => this.once(`drive ${once[0]}`));
+      if (once) addButton(pad, name, once[2], `drive ${once[0]}`).addEventListener("click", () => this.once(`drive ${once[0]}`));
     }
     for (const [code, word, keys] of STEPS) {
-      addButton(arm, word, keys).addEventListener("click", () => this.once(`arm ${code}`));
+      addButton(arm, word, keys, `arm ${code}`).addEventListener("click", () => this.once(`arm ${code}`));
     }
   }
 
@@ -291,7 +310,7 @@ export class Driving {
    * @param {Key} key
    */
   heldButton(pad, [code, word, keys]) {
-    const button = addButton(pad, word, keys);
+    const button = addButton(pad, word, keys, `drive ${code}`);
     button.addEventListener("pointerdown", (event) => {
       button.setPointerCapture(event.pointerId);
       this.hold(code, button, button);
@@ -344,6 +363,7 @@ export class Driving {
     addEventListener("contextmenu", (event) => event.defaultPrevented || this.letGo());
     addEventListener("pointerdown", (event) => ownsKeys(event.target) && this.letGo(), { capture: true });
     this.parts.armed.addEventListener("change", () => {
+      drawSticks(this.parts.sticks, null);
       this.gamepads.forget();
       this.letGo();
     });
@@ -356,6 +376,7 @@ export class Driving {
     if (!this.parts.armed.checked) return;
     const was = this.padCode;
     this.padCode = this.gamepads.read();
+    drawSticks(this.parts.sticks, this.gamepads.axes);
     if (was === this.padCode) return;
     this.release("pad");
     if (this.padCode) this.hold(this.padCode, "pad");
@@ -384,11 +405,13 @@ function place({ code, key }) {
  * @param {HTMLElement} parent
  * @param {string} word
  * @param {string[]} keys
+ * @param {string} action
  */
-function addButton(parent, word, keys) {
+function addButton(parent, word, keys, action) {
   const button = document.createElement("button");
   button.type = "button";
   button.dataset.word = word;
+  button.dataset.action = action;
   button.id = `${parent.id}-${word}`;
   button.textContent = say(word);
   const [key] = keys;

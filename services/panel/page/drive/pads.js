@@ -56,6 +56,12 @@ export class Pads {
      */
     this.known = new Map();
     this.came = 0;
+    /**
+     * The axes of the entry that counts, or of one that does not yet; null without a gamepad.
+     *
+     * @type {readonly number[] | null}
+     */
+    this.axes = null;
     this.since = now();
     /**
      * The entry that says something, by its place.
@@ -73,6 +79,7 @@ export class Pads {
     this.came = 0;
     this.since = this.now();
     this.speaks = null;
+    this.axes = null;
   }
 
   /**
@@ -91,6 +98,7 @@ export class Pads {
     const counts = there.filter(({ pad, index }) => this.isBelieved(pad, index, newest, there));
     // Who speaks goes on speaking; another pad does not talk into it.
     const speaker = counts.find(({ index }) => index === this.speaks) ?? counts.find(({ pad }) => code(pad));
+    this.axes = (speaker ?? counts[0] ?? there[0])?.pad.axes ?? null;
     const said = speaker ? code(speaker.pad) : null;
     this.speaks = said === null ? null : speaker?.index ?? null;
     return said;

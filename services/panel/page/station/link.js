@@ -2,8 +2,8 @@
 //
 // What the station says, one or more lines in a message (services/panel/src/speech.rs):
 //
-//   you <name> driver|viewer
-//   time <ms>                         the station's clock, in ms since 1970; first, and once a second
+//   you <name> driver|viewer <release of the station's program>
+//   time <ms> [<here>]                the station's clock, in ms since 1970; first, and after each `here`, which it repeats
 //   warehouse <json>
 //   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
@@ -64,6 +64,16 @@ export class Link extends EventTarget {
      */
     this.me = null;
     this.mayDrive = false;
+    /** The release of the station's program, which brought this page too. */
+    this.release = "";
+    /** When the station was last heard, by this page's clock. */
+    this.heard = -Infinity;
+    /**
+     * How long its last answer to `here` took, in ms.
+     *
+     * @type {number | null}
+     */
+    this.trip = null;
     this.open = false;
     /**
      * Why the station has closed the connection, if it has said so.
@@ -117,6 +127,7 @@ export class Link extends EventTarget {
       this.emit("link");
     };
     socket.onmessage = (message) => {
+      this.heard = performance.now();
       for (const line of message.data.split("\n")) {
         if (line) this.hear(line);
       }
@@ -224,6 +235,7 @@ export class Link extends EventTarget {
       this.answer(first, rest);
     } else if (word === "time") {
       this.setTime(Number(first));
+      if (rest[0]) this.trip = clock() - Number(rest[0]);
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
@@ -233,6 +245,7 @@ export class Link extends EventTarget {
       this.closed = null;
       this.me = first;
       this.mayDrive = rest[0] === "driver";
+      this.release = rest[1] ?? "";
       this.emit("link");
     }
   }

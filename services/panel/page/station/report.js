@@ -46,6 +46,7 @@ const NOW = {
   queue(robot, [, ...words]) {
     robot.queue = groups(words, 2).map(([order = "", product = ""]) => ({ order, product }));
   },
+  health: (robot, words, now) => robot.tellsHealth(fields(words), now),
   truth(robot, [x, y, heading, carrying]) {
     robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
   },

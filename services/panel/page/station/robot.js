@@ -86,6 +86,14 @@ export class Robot {
      * @type {Sensor[] | null}
      */
     this.sensors = null;
+    /**
+     * How its machine, services and boards are (bus/lines/src/extension/health.rs).
+     *
+     * @type {Fields | null}
+     */
+    this.health = null;
+    /** When it told that, by this page's clock. */
+    this.healthAt = -Infinity;
     /** @type {[number, number][]} */
     this.route = [];
     /**
@@ -154,6 +162,17 @@ export class Robot {
     const after = this.events.findLastIndex(({ at }) => at <= entry.at);
     this.events.splice(after + 1, 0, entry);
     if (this.events.length > ENTRIES) this.events.shift();
+  }
+
+  /**
+   * Takes over how it is.
+   *
+   * @param {Fields} health
+   * @param {number} now when it came, by this page's clock
+   */
+  tellsHealth(health, now) {
+    this.health = health;
+    this.healthAt = now;
   }
 
   /**

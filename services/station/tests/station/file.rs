@@ -59,7 +59,7 @@ fn what_was_saved_is_read() {
     assert_eq!(find("12"), Ok(product(12)));
     for unknown in ["nails", "13"] {
         let why = find(unknown).expect_err(unknown).to_string();
-        let wanted = format!("the warehouse has no product {unknown}; it has 7 (screws), 12");
+        let wanted = format!("the warehouse has no goods {unknown}; it has 7 (screws), 12");
         assert_eq!(why, wanted);
     }
 

@@ -271,7 +271,7 @@ fn queues_outlive_a_station_that_was_killed() {
         unknown.fetch = vec![(r2(), Called::Name("nails".into()))];
         let why = Server::open(unknown).expect_err("nails").to_string();
         assert!(
-            why.contains("no product nails") && why.contains(known),
+            why.contains("no goods nails") && why.contains(known),
             "{why}"
         );
     }

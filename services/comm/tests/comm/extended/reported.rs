@@ -1,9 +1,10 @@
 //! What such a station is told of the robot, and no other peer is.
 
-use lager_comm::{Conversation, LinkLost, Senses};
+use lager_comm::{Conversation, LinkLost, Machine, Senses};
 use lager_floor::Heading;
+use lager_home::Watched;
 use lager_lines::Name;
-use lager_lines::extension::Latency;
+use lager_lines::extension::{Finding, Latency};
 use lager_orders::Mode;
 use lager_sample::Stamp;
 use lager_topics::{
@@ -166,7 +167,7 @@ fn lists_are_told_when_they_have_changed_and_anew_to_each_station() {
     let lists = |robot: &mut Robot| {
         pass(robot, 200);
         let mut shown = core::mem::take(&mut robot.shown);
-        shown.retain(|line| !line.starts_with("state "));
+        shown.retain(|line| !line.starts_with("state ") && !line.starts_with("health "));
         shown
     };
     let wanted = ["blocked 1 2 0 up 81", "queue 2 4 7 5 7"];
@@ -429,4 +430,59 @@ fn one_that_is_on_its_way_is_not_calibrated() {
     robot.told();
     robot.hears(&["do 2 calibrate"]);
     assert!(robot.asked.is_some(), "a person moves one that is stopped");
+}
+
+#[test]
+fn how_machine_services_and_boards_are_is_told_once_a_second() {
+    let mut robot = extended(Mode::Autonomous);
+    (robot.health.sensor.up, robot.health.sensor.packets) = (1, 9);
+    robot.health.sensor.version = 1;
+    robot.health.steering.reboots = 4;
+    robot.told();
+    let service = |name: &str, pid, restarts, since_ns| Watched {
+        name: name.to_owned(),
+        pid,
+        since_ns,
+        restarts,
+    };
+    let began = robot.now.ns;
+    robot.conversation.machine(Machine {
+        load_percent: Some(37),
+        memory_mib: Some([3_794, 2_100]),
+        services: vec![
+            service("bridge", Some(7), 0, 0),
+            service("logic", None, 2, began),
+        ],
+        found: vec![Finding {
+            code: Name::new("shared_memory").expect("a name"),
+            seen: 12,
+        }],
+    });
+    robot.shown.clear();
+    pass(&mut robot, 3_000);
+    let told = robot
+        .shown
+        .iter()
+        .filter(|line| line.starts_with("health "));
+    let told: Vec<_> = told.collect();
+    assert_eq!(told.len(), 3, "{told:?}");
+    for field in [
+        " load_percent=37 ",
+        " memory_mib=3794 memory_free_mib=2100 ",
+        " sensor_age_ms=",
+        " sensor_version=1 ",
+        " steering_restarts=4 ",
+        " found=shared_memory:12",
+    ] {
+        assert!(told[0].contains(field), "{field}: {}", told[0]);
+    }
+    let services = " services=bridge:up:";
+    assert!(
+        told[0].contains(services) && told[0].contains(",logic:down:"),
+        "{}",
+        told[0]
+    );
+    assert!(told[0].contains(":2 found"), "{}", told[0]);
+    // The steering board has never been heard.
+    assert!(!told[0].contains("steering_age_ms"), "{}", told[0]);
 }

@@ -1,0 +1,110 @@
+// The Health view: where the link is cut, the robot's services, losses, machine and versions.
+
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+/** @import { Mark, Row } from "./model.js" */
+
+import { chain, isOld, losses, machine, services, versions } from "./model.js";
+import { age } from "../bar/face.js";
+import { make, set } from "../parts/svg.js";
+import { put, say } from "../words/words.js";
+
+/**
+ * The shape of each mark, in a square of 20.
+ *
+ * @type {Record<Mark, string>}
+ */
+const MARKS = {
+  good: "M10 2a8 8 0 1 0 0 16a8 8 0 1 0 0-16M6.5 10l2.5 2.5 4.5-5",
+  bad: "M2 2h16v16H2zM7 7l6 6m0-6l-6 6",
+  unknown: "M10 2a8 8 0 1 0 0 16a8 8 0 1 0 0-16",
+};
+
+/** @typedef {{ item: HTMLLIElement, shape: SVGSVGElement, path: SVGPathElement, name: HTMLElement, value: HTMLElement, said: HTMLElement }} Drawn a row as it is drawn */
+
+export class Health {
+  /**
+   * @param {Link} link
+   * @param {Record<"body" | "said" | "links" | "services" | "machine" | "losses" | "versions", HTMLElement>} parts `said`
+   *   is for how old they are
+   */
+  constructor(link, parts) {
+    this.link = link;
+    this.parts = parts;
+    /**
+     * The rows of each list, by their ids.
+     *
+     * @type {Map<HTMLElement, Map<string, Drawn>>}
+     */
+    this.rows = new Map();
+  }
+
+  /**
+   * Draws it where it is in view.
+   *
+   * @param {Robot | null} robot
+   * @param {number} now
+   */
+  draw(robot, now) {
+    const { parts, link } = this;
+    if (document.body.dataset.view !== "health") return;
+    this.list(parts.links, chain(link, robot, now));
+    const told = robot?.health ? robot : null;
+    const isStale = told !== null && isOld(told, now);
+    parts.body.classList.toggle("old", isStale);
+    put(parts.said, told ? (isStale ? say("health_as_of", age(now - told.healthAt)) : "") : say("health_untold"));
+    this.list(parts.services, told ? services(told) : []);
+    this.list(parts.losses, told ? losses(told) : []);
+    this.list(parts.machine, told ? machine(told) : []);
+    this.list(parts.versions, versions(link, robot));
+  }
+
+  /**
+   * Shows these rows in a list, and touches only what has changed.
+   *
+   * @param {HTMLElement} list
+   * @param {Row[]} rows
+   */
+  list(list, rows) {
+    list.parentElement?.toggleAttribute("hidden", !rows.length);
+    const known = this.rows.get(list) ?? new Map();
+    this.rows.set(list, known);
+    for (const [id, { item }] of known) {
+      if (rows.some((row) => row.id === id)) continue;
+      item.remove();
+      known.delete(id);
+    }
+    rows.forEach((row, place) => {
+      const drawn = known.get(row.id) ?? newRow(row.id);
+      known.set(row.id, drawn);
+      if (list.children[place] !== drawn.item) list.insertBefore(drawn.item, list.children[place] ?? null);
+      fill(drawn, row);
+    });
+  }
+}
+
+/**
+ * @param {string} id
+ * @returns {Drawn}
+ */
+function newRow(id) {
+  const item = document.createElement("li");
+  item.dataset.row = id;
+  const shape = make("svg", { viewBox: "0 0 20 20", role: "img" }, item);
+  const [name, value, said] = [document.createElement("strong"), document.createElement("span"), document.createElement("p")];
+  item.append(name, value, said);
+  return { item, shape, path: make("path", {}, shape), name, value, said };
+}
+
+/**
+ * @param {Drawn} drawn
+ * @param {Row} row
+ */
+function fill(drawn, { mark, name, value, said }) {
+  set(drawn.item, "data-mark", mark);
+  set(drawn.path, "d", MARKS[mark]);
+  set(drawn.shape, "aria-label", say(`mark_${mark}`));
+  put(drawn.name, name);
+  put(drawn.value, value);
+  put(drawn.said, said ?? "");
+}
