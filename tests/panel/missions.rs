@@ -64,7 +64,7 @@ pub(crate) fn orders_are_moved_by_a_pointer_and_by_keys_as_the_robot_says(
     let robot_says = |goods: [&str; 2]| {
         let told = scene.domain.run(&["queue"]).stdout;
         let told = String::from_utf8(told).expect("a text");
-        let [one, other] = goods.map(|id| told.find(&format!("product {id}")).expect("it waits"));
+        let [one, other] = goods.map(|id| told.find(&format!("goods {id}")).expect("it waits"));
         assert!(one < other, "{told}");
     };
     let (from, to) = (

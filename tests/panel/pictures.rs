@@ -1,5 +1,5 @@
-//! Takes pictures of the panel's views: each in both themes, on a laptop and on a phone, one on a
-//! large screen. Played robots show states that a simulated robot hardly gets into.
+//! Takes pictures of the panel's views: each in both themes, on a laptop, at a desk and on a phone, one
+//! on a large screen. Played robots show states that a simulated robot hardly gets into.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -10,8 +10,11 @@ use crate::browser::Page;
 use crate::played::Stage;
 
 /// Name, width and height in pixels, and whether the screen is held in the hand.
-const SCREENS: [(&str, u32, u32, bool); 2] =
-    [("laptop", 1280, 720, false), ("phone", 360, 740, true)];
+const SCREENS: [(&str, u32, u32, bool); 3] = [
+    ("laptop", 1280, 720, false),
+    ("desk", 1920, 1080, false),
+    ("phone", 360, 740, true),
+];
 
 /// Takes a picture of the current view.
 fn view(page: &mut Page, name: &str) {
@@ -47,10 +50,17 @@ fn of_every_view() {
     page.dress("light", 3840, 2160, false);
     take(&mut page, "under-way-4k-light");
     page.dress("light", 1280, 720, false);
-    for tab in ["setup", "line", "log"] {
+    for tab in ["setup", "line", "log", "health", "signals"] {
         page.click(&format!("#tab-{tab}"));
         view(&mut page, tab);
     }
+    page.click("#help-open");
+    view(&mut page, "help");
+    page.click("#help-close");
+    page.click("#language");
+    page.click("#tab-missions");
+    view(&mut page, "under-way-swedish");
+    page.click("#language");
     page.click("#tab-missions");
     page.wait_for("#state", "stands at the goods");
     view(&mut page, "picking");
@@ -61,6 +71,10 @@ fn of_every_view() {
     scene.resume();
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
     view(&mut page, "blocked");
+    page.click("#time-before");
+    page.wait_until("!document.querySelector('#moment').hidden");
+    view(&mut page, "past");
+    page.click("#time-now");
     // As seen by people who cannot tell some colours apart, or see none.
     for eyes in ["protanopia", "deuteranopia", "tritanopia", "achromatopsia"] {
         let params = serde_json::json!({ "type": eyes });
@@ -94,9 +108,9 @@ fn of_every_view() {
     scene.end();
 }
 
-const SMALL: &str = "size = [2, 3]\nside_length_cm = 50\ndelivery = [0, 0]\n\
+const SMALL: &str = "size = [2, 2]\nside_length_cm = 50\ndelivery = [0, 0]\n\
     [[product]]\nid = 1\nname = \"matches\"\nsquare = [1, 1]\nside = \"left\"\n\
-    [[product]]\nid = 2\nname = \"nails\"\nsquare = [0, 2]\nside = \"right\"\n";
+    [[product]]\nid = 2\nname = \"nails\"\nsquare = [0, 0]\nside = \"right\"\n";
 
 /// A robot's state line; `more` adds what the robot does, and boards that do not report.
 fn state(more: &str) -> String {
