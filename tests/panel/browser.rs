@@ -207,6 +207,16 @@ impl Page {
         });
     }
 
+    /// Orders goods by the field, anew as long as the page says that what it shows is old.
+    pub(crate) fn order(&mut self, goods: &str) {
+        wait_for("the order to be given", || {
+            self.fill("#goods", goods);
+            self.click("#fetch button");
+            let said = self.text("#missions-said");
+            (!said.contains("what is shown is old")).then_some(())
+        });
+    }
+
     /// The middle of the first element that matches, in pixels.
     pub(crate) fn middle(&mut self, selector: &str) -> (f64, f64) {
         let place = self.value(&format!(

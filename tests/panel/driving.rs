@@ -306,8 +306,12 @@ pub(crate) fn by_hand_needs_the_wheel_and_asks_during_a_mission(
     page.wait_for("#hand-said", "The robot is fetching");
     page.click("#hand-leave");
     page.wait_until("document.querySelector('#hand').hidden");
-    std::thread::sleep(std::time::Duration::from_secs(6));
     let said = "sent.filter((line) => line.includes(' mode manual')).length";
+    assert_eq!(page.value(said), 0, "it is left to the robot");
+    // Nobody answers.
+    page.click("#manual");
+    page.wait_for("#hand-said", "Without an answer it goes on");
+    page.wait_until("document.querySelector('#hand').hidden");
     assert_eq!(page.value(said), 0, "it is left to the robot");
     page.click("#manual");
     page.click("#hand-now");

@@ -41,6 +41,13 @@ fn robots_stand_on_one_map_and_whoever_needs_a_person_comes_first() {
     first.says(&[&format!("{state} {} steering_up=1", at(500)).replace("stopped=0", "stopped=1")]);
     rows(&mut page, "r1 r2");
     page.wait_until("document.querySelector('#map .other.stopped') !== null");
+    // What helps stands beside each, and is done for that robot.
+    let lost = "failure=lost_line failure_expected=0 failure_seen=0 remedy=reset";
+    first.says(&[&format!("{state} {} steering_up=1 {lost}", at(500))]);
+    page.wait_for("#fleet-list li", "Say where it stands");
+    page.click("#fleet-list li:first-child button:not([aria-pressed])");
+    page.wait_until("document.querySelector('#where').open");
+    assert_eq!(page.value("location.search"), "?r1");
     drop((page, first, second));
     stage.end();
 }

@@ -115,8 +115,7 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     // Puts a thing on the short way to product 2 while the robot fetches product 1.
     page.click_at_mm(0.0, 750.0);
     page.wait_for("#map-said", "obstacle put");
-    page.value("document.querySelector('#goods').value = '2'");
-    page.click("#fetch button");
+    page.order("2");
     wait_for("it to wait or to be under way", || {
         let shown = page.text("#queue") + &page.text("#order-number");
         shown.contains('2').then_some(())

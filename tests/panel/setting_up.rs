@@ -148,20 +148,16 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
     page.key_down("Escape");
     page.key_up("Escape");
     page.wait_for("#stop-said", "both wheels stand");
-    let order = |page: &mut Page, product: &str| {
-        page.fill("#goods", product);
-        page.click("#fetch button");
-    };
     // Without its buttons, a waiting order's text is only its number.
     let waiting = "[...document.querySelectorAll('#queue .waiting')].map((line) => \
                    line.firstChild.textContent).join()";
     for (product, queue) in [("2", "2"), ("3", "2,3")] {
-        order(page, product);
+        page.order(product);
         page.wait_until(&format!("{waiting} === '{queue}'"));
     }
     // A product that already has an order cannot get a second; the page shows the reason there.
     for product in ["1", "3"] {
-        order(page, product);
+        page.order(product);
         page.wait_for(
             "#missions-said",
             &format!("goods {product} are ordered already"),
@@ -208,8 +204,7 @@ fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     assert!(texts(&mut page, "#history li").contains('3'));
 
     // An order can be cancelled as long as its goods are not in the claw.
-    page.fill("#goods", "2");
-    page.click("#fetch button");
+    page.order("2");
     page.wait_for("#order-number", "2");
     page.click("#order-cancel");
     page.wait_until("document.querySelector('#order').hidden");

@@ -103,15 +103,18 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
 pub(crate) fn one_press_on_fetch_is_one_order(_scene: &mut Scene, page: &mut Page) {
     page.wait_until("document.querySelectorAll('#tiles button').length > 0");
     page.listen_in();
-    page.value(
+    let orders = "sent.filter((line) => / order \\d+ 2$/.test(line)).length";
+    wait_for("an order", || {
+        page.value(
         "(() => { const goods = document.querySelector('#goods'); goods.value = '2'; \
          const fetch = document.querySelector('#fetch [type=submit]'); \
          for (let press = 0; press < 5; press++) fetch.click(); })()",
-    );
+        );
+        (page.value(orders) != 0).then_some(())
+    });
     page.pause();
     page.value("document.querySelector('#fetch [type=submit]').click()");
-    let orders = page.value("sent.filter((line) => / order \\d+ 2$/.test(line)).length");
-    assert_eq!(orders, 1);
+    assert_eq!(page.value(orders), 1);
 }
 
 pub(crate) fn what_happens_to_the_robot_is_in_the_log_and_survives_the_station(

@@ -35,16 +35,17 @@ pub(crate) fn what_is_pressed_while_the_panel_is_silent_is_refused_and_never_don
     page.wait_for("#drive-said", "what is shown is old");
     for goods in ["2", "3"] {
         page.value(&format!(
-            "document.querySelector('#goods').value = '{goods}'; \
+            "document.querySelector('#missions-said').textContent = ''; \
+             document.querySelector('#goods').value = '{goods}'; \
              document.querySelector('#fetch [type=submit]').click()"
         ));
+        page.wait_for("#missions-said", "what is shown is old");
     }
     // Longer than an order may wait anywhere.
     std::thread::sleep(Duration::from_secs(3));
     drop(frozen);
     // The first that the page draws is the newest.
     page.wait_until("!document.body.classList.contains('stale')");
-    page.wait_until("document.querySelector('#missions-said').textContent.length > 0");
     scene.assert_stands();
     assert_eq!(page.value(WAITING), waiting);
 }

@@ -106,7 +106,7 @@ const strips = new Strips(at("strips"), (lane) => {
 });
 const notify = new Notify(link, at("notify"));
 const log = new Log({ panel: at("log"), map: at("map-zone"), filter: at("filter"), kinds: at("log-kinds"), entries: at("entries"), earlier: at("log-earlier"), said: at("log-said") }, { kept, moment, robot });
-const save = new Save(link, { span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
+const save = new Save({ span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot, () => moment.at ?? link.now());
 const timeLine = new TimeLine(link, {
   line: at("time"), slider: at("time-line"), choice: at("time-span"), from: at("time-from"), before: at("time-before"), after: at("time-after"), now: at("time-now"), tag: at("moment"),
 }, { kept, moment, robot });
@@ -263,7 +263,7 @@ function drawRest(shown, time, seen, then) {
   const isNow = seen === shown;
   const others = isNow ? [...link.robots.values()].filter((other) => other !== shown) : shown ? [asNow(shown)] : [];
   map.draw(seen, others, then, isNow ? face : seen ? moment.face() : null);
-  drawRemedy(face);
+  drawRemedy(at("remedy"), face);
   fleet.draw(shown, time);
   missions.draw(shown, time);
   arm.draw(shown);

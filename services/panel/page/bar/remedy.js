@@ -2,7 +2,6 @@
 
 /** @import { Face } from "./face.js" */
 
-import { at } from "../parts/at.js";
 import { put } from "../words/words.js";
 
 /**
@@ -12,13 +11,21 @@ import { put } from "../words/words.js";
  */
 const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup", reload: "reload" };
 
-/** @param {Face} face */
-export function drawRemedy({ remedy }) {
-  const button = at("remedy");
+/**
+ * Has a button do what helps, or hides it where this page has nothing that does.
+ *
+ * @param {HTMLButtonElement} button
+ * @param {Face} face
+ * @param {(() => void) | null} choose brings the robot into view first, if it is another one
+ */
+export function drawRemedy(button, { remedy }, choose = null) {
   const control = document.getElementById((remedy && REMEDIES[remedy]) || "");
   button.hidden = !(control instanceof HTMLButtonElement);
   if (!(control instanceof HTMLButtonElement)) return;
   put(button, control.textContent);
-  button.disabled = control.disabled;
-  button.onclick = () => control.click();
+  button.disabled = !choose && control.disabled;
+  button.onclick = () => {
+    choose?.();
+    control.click();
+  };
 }

@@ -1,5 +1,5 @@
 // Taking a robot by hand needs the wheel. One that is on its way is not taken by a hand that slipped: the page
-// asks first, and takes it when the time is over unless it is left to the robot.
+// asks first, and without an answer the robot goes on by itself.
 
 /** @import { Link } from "../station/link.js" */
 /** @import { Robot } from "../station/robot.js" */
@@ -7,7 +7,7 @@
 import { say, put } from "../words/words.js";
 
 /** How long there is to think, in ms. */
-const THINK_MS = 5_000;
+const THINK_MS = 10_000;
 
 export class ByHand {
   /**
@@ -24,7 +24,7 @@ export class ByHand {
     this.take = take;
     this.tell = tell;
     /**
-     * The robot that is asked about, and when it is taken.
+     * The robot that is asked about, and when the question ends.
      *
      * @type {{ robot: Robot, product: string, at: number } | null}
      */
@@ -64,7 +64,7 @@ export class ByHand {
     // What it was asked about is over.
     if (robot !== asked.robot || robot.driver !== this.link.me || robot.state.mode !== "autonomous") return this.leave();
     const left = asked.at - performance.now();
-    if (left <= 0) return this.now();
+    if (left <= 0) return this.leave();
     parts.box.hidden = false;
     put(parts.said, say("hand_asked", asked.product, Math.ceil(left / 1_000)));
   }

@@ -6,13 +6,14 @@
 
 import { battery } from "../bar/battery.js";
 import { face, SHAPES } from "../bar/face.js";
+import { drawRemedy } from "../bar/remedy.js";
 import { make } from "../parts/svg.js";
 import { put, say } from "../words/words.js";
 
 /** The looks, the gravest first. */
 const GRAVITY = Object.keys(SHAPES);
 
-/** @typedef {{ item: HTMLElement, button: HTMLButtonElement, shape: Element } & Record<"name" | "said" | "more", HTMLElement>} Row */
+/** @typedef {{ item: HTMLElement, button: HTMLButtonElement, remedy: HTMLButtonElement, shape: Element } & Record<"name" | "said" | "more", HTMLElement>} Row */
 
 export class Fleet {
   /**
@@ -45,10 +46,11 @@ export class Fleet {
       const row = this.row(robot);
       // A row that stays in its place keeps the reader's focus.
       if (this.list.children[place] !== row.item) this.list.insertBefore(row.item, this.list.children[place] ?? null);
-      const { button, shape, name, said, more } = row;
+      const { button, remedy, shape, name, said, more } = row;
       button.setAttribute("aria-pressed", String(robot === shown));
       button.dataset.look = state.look;
       shape.setAttribute("d", SHAPES[state.look]);
+      drawRemedy(remedy, state, () => this.choose(robot.name));
       put(name, robot.name);
       put(said, state.said ?? "");
       put(more, [state.since, state.more, ...figures(robot)].filter(Boolean).join(" \u00b7 "));
@@ -69,8 +71,10 @@ export class Fleet {
     const shape = make("path", {}, make("svg", { viewBox: "0 0 32 32", "aria-hidden": "true" }, button));
     const [name, said, more] = [document.createElement("strong"), document.createElement("span"), document.createElement("small")];
     button.append(name, said, more);
-    item.append(button);
-    const row = { item, button, shape, name, said, more };
+    const remedy = document.createElement("button");
+    remedy.type = "button";
+    item.append(button, remedy);
+    const row = { item, button, remedy, shape, name, said, more };
     this.rows.set(robot.name, row);
     return row;
   }

@@ -4,6 +4,8 @@
 import { SHAPES } from "../bar/face.js";
 import { isText } from "../bar/stop.js";
 import { KEYS } from "../drive/drive.js";
+import { MARKS } from "../health/health.js";
+import { KINDS } from "../log/kinds.js";
 import { make } from "../parts/svg.js";
 import { say } from "../words/words.js";
 
@@ -13,6 +15,12 @@ import { say } from "../words/words.js";
  * @type {[string, string][]}
  */
 const PAGE_KEYS = [["Esc", "key_stop"], ["Space", "key_space"], ["?", "key_help"], ["Tab", "key_next"], ["\u2190 \u2192 \u2191 \u2193", "key_tabs"], ["Enter", "key_press"]];
+/**
+ * Keys of lists, of the time line and of the curves.
+ *
+ * @type {[string, string][]}
+ */
+const VIEW_KEYS = [["/", "key_search"], ["K J", "key_events"], ["\u2190 \u2192 Home End", "key_time"], ["Alt \u2191 \u2193", "key_queue"], ["Delete", "key_queue_out"]];
 /** @type {[string, string][]} */
 const MAP_KEYS = [["\u2190 \u2192 \u2191 \u2193", "key_map"], ["Enter", "key_map_enter"], ["Shift \u2190 \u2192", "key_map_move"], ["+ \u2212", "key_map_zoom"]];
 /** The colours that have a meaning. */
@@ -54,13 +62,15 @@ export class Help {
   write() {
     const legend = document.createElement("ul");
     for (const row of this.legend.querySelectorAll("li")) legend.append(row.cloneNode(true));
-    const states = list(Object.entries(SHAPES).map(([look, shape]) => [stateSign(shape), say(`look_${look}`)]));
+    const states = list(Object.entries(SHAPES).map(([look, shape]) => [shapeSign(32, shape), say(`look_${look}`)]));
+    const kinds = list(Object.values(KINDS).map(([word, shape]) => [shapeSign(20, shape), say(word)]));
+    const marks = list(Object.entries(MARKS).map(([mark, shape]) => [shapeSign(20, shape), say(`mark_${mark}`)]));
     const colours = list(COLOURS.map((colour) => [colourSign(colour), say(`colour_${colour}`)]));
     /** @param {[string, string][]} all */
     const keys = (all) => list(all.map(([key, word]) => [keySign(key), say(word)]));
     this.body.replaceChildren(
-      section("help_states", states), section("legend", legend), section("help_colours", colours),
-      section("help_keys", keys(PAGE_KEYS)), section("help_map_keys", keys(MAP_KEYS)), section("help_drive_keys", keys(KEYS.wheels)), section("help_arm_keys", keys(KEYS.arm)),
+      section("help_states", states), section("legend", legend), section("help_colours", colours), section("log", kinds), section("health", marks),
+      section("help_keys", keys(PAGE_KEYS)), section("help_view_keys", keys(VIEW_KEYS)), section("help_map_keys", keys(MAP_KEYS)), section("help_drive_keys", keys(KEYS.wheels)), section("help_arm_keys", keys(KEYS.arm)),
     );
   }
 }
@@ -90,9 +100,14 @@ function list(rows) {
   return element;
 }
 
-/** @param {string} shape */
-function stateSign(shape) {
-  const sign = make("svg", { viewBox: "0 0 32 32", class: "state", "aria-hidden": "true" });
+/**
+ * A shape in a square of so many units.
+ *
+ * @param {number} size
+ * @param {string} shape
+ */
+function shapeSign(size, shape) {
+  const sign = make("svg", { viewBox: `0 0 ${size} ${size}`, class: "state", "aria-hidden": "true" });
   make("path", { d: shape }, sign);
   return sign;
 }

@@ -20,8 +20,9 @@ const EVENT = {
 };
 
 export class Save {
-  constructor(link, parts, robot) {
-    Object.assign(this, { link, parts, robot });
+  /** `until` says where the time ends that is saved. */
+  constructor(parts, robot, until) {
+    Object.assign(this, { parts, robot, until });
     parts.span.replaceChildren(...SPANS_MS.map((ms) => new Option(span(ms), ms)));
     parts.csv.onclick = () => this.save("csv", "text/csv", table);
     parts.mcap.onclick = () => this.save("mcap", "application/octet-stream", recording);
@@ -37,7 +38,7 @@ export class Save {
     if (!robot || this.isSaving) return;
     this.isSaving = true;
     put(this.parts.said, "");
-    const until = this.link.now();
+    const until = this.until();
     try {
       const anchor = document.createElement("a");
       const file = await content({ robot: robot.name, since: until - Number(this.parts.span.value), until });

@@ -30,7 +30,7 @@ export class Missions {
     this.order = new Order({ card: parts.order, number: parts.orderNumber, name: parts.orderName, where: parts.orderWhere, time: parts.orderTime, steps: parts.orderSteps });
     this.queue = new Queue(parts.queue, { isArmed, move: (...where) => this.move(...where), cancel: (order) => this.cancel(order) });
     this.tiles = new Tiles({ form: parts.fetch, field: parts.goods, tiles: parts.tiles, said: parts.said }, {
-      offers, isOff: () => isArmed() || !isOpen(), fetch: (product, hand) => this.fetch(product, hand),
+      offers, isOff: () => isArmed() || !isOpen(),
     });
     this.past = new Past(link, { open: parts.pastOpen, box: parts.past, rest: parts.rest, goods: parts.pastGoods, time: parts.pastTime, totals: parts.pastTotals, list: parts.history });
     parts.orderCancel.onclick = () => this.cancel(this.robot()?.state.order);

@@ -11,9 +11,9 @@ import { matches } from "./reorder.js";
 const SOME = 3;
 
 export class Tiles {
-  /** `offers` says what goods are and what a click does, `fetch` orders goods; `isOff` says whether keys are others'. */
-  constructor({ form, field, tiles, said }, { offers, fetch, isOff }) {
-    Object.assign(this, { form, field, tiles, said, offers, fetch });
+  /** `offers` says what goods are and what a click does; `isOff` says whether keys are others'. */
+  constructor({ form, field, tiles, said }, { offers, isOff }) {
+    Object.assign(this, { form, field, tiles, said, offers });
     this.goods = [];
     this.buttons = new Map();
     form.addEventListener("submit", (event) => {
@@ -41,12 +41,19 @@ export class Tiles {
     button.type = "button";
     button.dataset.product = id;
     button.append(parcel(id), Object.assign(document.createElement("span"), { textContent: name ?? "" }));
-    button.onclick = () => {
-      const { what, why, act } = this.offer(id);
-      put(this.said, why ? `${what}: ${why}` : "");
-      act?.();
-    };
+    button.onclick = () => this.order(id);
     return button;
+  }
+
+  /**
+   * Orders goods, or says why not.
+   *
+   * @param {string} id
+   */
+  order(id) {
+    const { what, why, act } = this.offer(id);
+    put(this.said, why ? `${what}: ${why}` : "");
+    act?.();
   }
 
   /** What a click on the tile does now. */
@@ -93,7 +100,7 @@ export class Tiles {
     if (!found.length) return put(said, say("search_none"));
     field.value = "";
     this.find();
-    this.fetch(String(found[0].id), { beside: this.form, said });
+    this.order(String(found[0].id));
   }
 }
 

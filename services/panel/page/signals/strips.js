@@ -20,7 +20,6 @@ const STRIPS = [
   ["line_error", "", -10, 10, ["line_error"]],
   ["duty", "%", 0, 255, ["left_duty", "right_duty"]],
   ["distance", "cm", 0, 80, ["distance_cm"]],
-  ["path", "µs", 0, null, ["path_p50", "path_p99"]],
   ["battery", "V", 9, 13, ["battery"]],
   ["losses", "", 0, null, ["lost"]],
 ];
@@ -46,8 +45,12 @@ export class Strips {
    * @param {(word: string) => void} open shows the lane of a strip that somebody has clicked
    */
   constructor(parent, open) {
-    /** @type {boolean | null} */
-    this.dark = null;
+    /**
+     * The theme that the colours are of.
+     *
+     * @type {string | null}
+     */
+    this.theme = null;
     this.colours = ["", ""];
     this.strips = STRIPS.map((strip) => new Strip(parent, open, ...strip));
     const [figure, row] = [document.createElement("figure"), document.createElement("div")];
@@ -75,9 +78,9 @@ export class Strips {
    * @param {number} now
    */
   draw(robot, now) {
-    const dark = DARK.matches;
-    if (this.dark !== dark) {
-      this.dark = dark;
+    const theme = document.documentElement.dataset.theme ?? String(DARK.matches);
+    if (this.theme !== theme) {
+      this.theme = theme;
       const style = getComputedStyle(document.body);
       this.colours = [style.getPropertyValue("--accent"), style.getPropertyValue("--quiet")];
     }
