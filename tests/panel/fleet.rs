@@ -42,10 +42,12 @@ fn robots_stand_on_one_map_and_whoever_needs_a_person_comes_first() {
     rows(&mut page, "r1 r2");
     page.wait_until("document.querySelector('#map .other.stopped') !== null");
     // What helps stands beside each, and is done for that robot.
-    let lost = "failure=lost_line failure_expected=0 failure_seen=0 remedy=reset";
-    first.says(&[&format!("{state} {} steering_up=1 {lost}", at(500))]);
-    page.wait_for("#fleet-list li", "Say where it stands");
-    page.click("#fleet-list li:first-child button:not([aria-pressed])");
+    let lost = "failure=line_lost failure_expected=0 failure_seen=0 remedy=reset";
+    let stuck = at(500).replace("waiting_for_order", "stuck");
+    first.says(&[&format!("{state} {stuck} steering_up=1 {lost}")]);
+    rows(&mut page, "r2 r1");
+    page.wait_for("#fleet-list li:nth-child(2)", "Say where it stands");
+    page.click("#fleet-list li:nth-child(2) button:not([aria-pressed])");
     page.wait_until("document.querySelector('#where').open");
     assert_eq!(page.value("location.search"), "?r1");
     drop((page, first, second));

@@ -33,6 +33,12 @@ test("what is told a second time is the same order", () => {
   assert.deepEqual(fetched().done.map(({ product }) => product), ["2", "1"]);
 });
 
+test("a thought that names no goods is of no order", () => {
+  const jobs = new Jobs();
+  jobs.take({ at: 0, kind: "thought", words: [], values: { kind: "has_goods" } });
+  assert.equal(jobs.now, null);
+});
+
 test("the time that is left is learned from what was delivered, and what takes longer than ever has none", () => {
   const jobs = fetched();
   const known = learn(jobs.done, far);

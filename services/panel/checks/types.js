@@ -1,8 +1,8 @@
 // Runs the type checker. The errors of the files in `untyped.txt` do not count; a file that has none left has to leave
-// that list.
+// that list. Without the list, all of them count.
 
 import { spawnSync } from "node:child_process";
-import { readFileSync, writeFileSync } from "node:fs";
+import { existsSync, readFileSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import { elements } from "./ids.js";
 
@@ -11,7 +11,8 @@ writeFileSync(here("types/ids.d.ts"), elements());
 const { stdout, stderr, error } = spawnSync(process.execPath, [here("../node_modules/typescript/bin/tsc"), "--project", here("../jsconfig.json"), "--pretty", "false"], { cwd: here(".."), encoding: "utf8" });
 if (error || stderr) throw error ?? new Error(stderr);
 
-const untyped = readFileSync(here("untyped.txt"), "utf8").split("\n").filter((line) => line && !line.startsWith("#"));
+const list = here("untyped.txt");
+const untyped = existsSync(list) ? readFileSync(list, "utf8").split("\n").filter((line) => line && !line.startsWith("#")) : [];
 const found = new Set();
 let isTold = false;
 const errors = stdout.split("\n").filter((line) => {

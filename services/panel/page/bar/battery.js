@@ -1,5 +1,7 @@
 // The battery in words: its charge and how long that lasts where the robot tells them, else its voltage.
 
+/** @import { State } from "../station/robot.js" */
+
 import { decimal, minutes, say } from "../words/words.js";
 
 /** From here on somebody should charge it, in percent and in s; the robot itself stands later. */
@@ -7,7 +9,7 @@ const LOW_PERCENT = 15;
 const LOW_S = 300;
 
 /**
- * @param {Record<string, string>} state of a robot
+ * @param {State} state of a robot
  * @returns {{ words: string, volts: string, isLow: boolean }} empty words where nothing is known
  */
 export function battery({ battery_dv: decivolts, battery_percent: percent, battery_left_s: left, hold }) {
@@ -19,5 +21,9 @@ export function battery({ battery_dv: decivolts, battery_percent: percent, batte
   return { words: charge && (isLow ? say("battery_low", charge + time) : charge + time), volts, isLow };
 }
 
-/** Minutes are enough until it is nearly empty. */
+/**
+ * Minutes are enough until it is nearly empty.
+ *
+ * @param {number} seconds
+ */
 const lasts = (seconds) => (seconds < 120 ? minutes(seconds * 1_000) : say("in_minutes", Math.round(seconds / 60)));

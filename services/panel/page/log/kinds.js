@@ -1,9 +1,16 @@
 // The kinds of what happens, each with its word and its shape, and every entry of the log as a sentence.
 
+/** @import { Entry } from "../station/robot.js" */
+
 import { PLAIN, called, crossing, reason, sentence, thought } from "../words/sentences.js";
 import { say } from "../words/words.js";
 
-/** The kinds in the order of the filter: the word, and the shape in a square of 20. */
+/** @typedef {"stop" | "help" | "goods" | "ways" | "persons" | "link" | "battery" | "settings"} Kind */
+/**
+ * The kinds in the order of the filter: the word, and the shape in a square of 20.
+ *
+ * @type {Record<Kind, [string, string]>}
+ */
 export const KINDS = {
   stop: ["log_stop", "M7 3h6l4 4v6l-4 4H7l-4-4V7zM6.5 10h7"],
   help: ["log_help", "M10 3l8 14H2zM10 8v4M10 14.5v.5"],
@@ -15,15 +22,21 @@ export const KINDS = {
   settings: ["log_settings", "M3 6h8M15 6h2M13 4v4M3 14h2M9 14h8M7 12v4"],
 };
 
+/** @type {Partial<Record<string, Kind>>} */
 const OF_EVENT = {
   stopped: "stop", resumed: "stop", failed: "help", refused: "help", pickup_refused: "help", in_position: "goods", getting_item: "goods",
   item_delivered: "goods", mode: "persons", restarted: "link", link_lost: "link", link_back: "link",
 };
+/** @type {Partial<Record<string, Kind>>} */
 const OF_WISH = {
   stop: "stop", resume: "stop", order: "goods", cancel: "goods", first: "goods", up: "goods", clear: "goods", back: "goods", picked: "goods",
   obstacle: "ways", gains: "settings", calibrate: "settings", pick: "settings", warehouse: "settings",
 };
-/** How the kinds of thoughts begin; all others are of the way. */
+/**
+ * How the kinds of thoughts begin; all others are of the way.
+ *
+ * @type {[RegExp, Kind][]}
+ */
 const OF_THOUGHT = [
   [/^(failed|pickup_refused|awaits|moves_alone)/, "help"],
   [/^(order|queue|goods|all_goods|fetching|picking|has_goods|delivered)/, "goods"],
@@ -36,22 +49,23 @@ const OF_THOUGHT = [
 /**
  * The kind of an entry of the log.
  *
- * @param {{ kind: string, words: string[], values: Record<string, string> | null }} entry
- * @returns {string} a key of `KINDS`
+ * @param {Entry} entry
+ * @returns {Kind}
  */
-export function kindOf({ kind, words, values }) {
-  if (kind === "event") return OF_EVENT[words[0]] ?? "ways";
-  if (kind === "asked") return OF_WISH[words[1]] ?? "persons";
+export function kindOf({ kind, words: [first = "", second = ""], values }) {
+  if (kind === "event") return OF_EVENT[first] ?? "ways";
+  if (kind === "asked") return OF_WISH[second] ?? "persons";
   // A refusal answers a person; a thought without values is said by the station, of its link.
   if (kind === "refused" || values?.because) return "persons";
-  if (!values?.kind) return "link";
-  return OF_THOUGHT.find(([begins]) => begins.test(values.kind))?.[1] ?? "ways";
+  const thought = values?.kind;
+  if (!thought) return "link";
+  return OF_THOUGHT.find(([begins]) => begins.test(thought))?.[1] ?? "ways";
 }
 
 /**
  * The crossing of an entry, as `2,1`; empty where it has none.
  *
- * @param {{ kind: string, words: string[], values: Record<string, string> | null }} entry
+ * @param {Entry} entry
  * @returns {string}
  */
 export function placeOf({ kind, words, values }) {
@@ -64,29 +78,43 @@ export function placeOf({ kind, words, values }) {
 /**
  * An entry as a sentence.
  *
- * @param {{ kind: string, words: string[], values: Record<string, string> | null }} entry
+ * @param {Entry} entry
  * @returns {string}
  */
 export function told({ kind, words, values }) {
-  if (kind === "refused") return say("blocked", reason(words[0]));
+  if (kind === "refused") return say("blocked", reason(words[0] ?? ""));
   if (kind === "thought") return say("thinks", (values && thought(values)) ?? words.join(" "));
   if (kind === "asked") return asked(words);
-  const [what, x, y, , product, ...more] = words;
+  const [what = "", x, y, , product, ...more] = words;
   return sentence(`event_${what}`, { product, node: crossing(`${x},${y}`), ...about(more) }) ?? what;
 }
 
-/** What a person calls the parts of a robot that stop it for him. */
+/**
+ * What a person calls the parts of a robot that stop it for him.
+ *
+ * @type {Partial<Record<string, string>>}
+ */
 const BY = { comm: "by_comm", operator: "by_operator" };
 
-/** What an event is about besides its place and its goods. */
-function about([first, second]) {
+/**
+ * What an event is about besides its place and its goods.
+ *
+ * @param {string[]} words
+ */
+function about([first, second = ""]) {
   const cause = (first !== "none" && sentence(`stop_cause_${first}`)) || "\u2013";
-  return { cause, by: BY[second] ? say(BY[second]) : second, mode: say(`mode_${first}`), service: first };
+  const by = BY[second];
+  return { cause, by: by ? say(by) : second, mode: say(`mode_${first}`), service: first };
 }
 
-/** Who at a page has asked for what. */
-function asked([name, what, first, ...more]) {
+/**
+ * Who at a page has asked for what.
+ *
+ * @param {string[]} words
+ */
+function asked([name = "", what = "", first = "", ...more]) {
   const who = called(name);
+  /** @type {Partial<Record<string, () => string | undefined>>} */
   const of = {
     mode: () => say(`mode_${first}`),
     order: () => more[0],

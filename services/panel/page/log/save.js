@@ -1,5 +1,8 @@
 // What the station keeps of the last day as a file: a table, or a recording.
 
+/** @import { Query } from "../station/history.js" */
+/** @import { Robot } from "../station/robot.js" */
+
 import { SPANS_MS, entries } from "../time/kept.js";
 import { mcap } from "./mcap.js";
 import { ask, lines, why } from "../station/history.js";
@@ -20,19 +23,33 @@ const EVENT = {
 };
 
 export class Save {
-  /** `until` says where the time ends that is saved. */
+  /**
+   * @param {{ span: HTMLSelectElement, csv: HTMLButtonElement, mcap: HTMLButtonElement, said: HTMLElement }} parts
+   * @param {() => Robot | null} robot
+   * @param {() => number} until where the time ends that is saved, in ms since 1970
+   */
   constructor(parts, robot, until) {
-    Object.assign(this, { parts, robot, until });
-    parts.span.replaceChildren(...SPANS_MS.map((ms) => new Option(span(ms), ms)));
+    this.parts = parts;
+    this.robot = robot;
+    this.until = until;
+    this.isSaving = false;
+    parts.span.replaceChildren(...SPANS_MS.map((ms) => new Option(span(ms), String(ms))));
     parts.csv.onclick = () => this.save("csv", "text/csv", table);
     parts.mcap.onclick = () => this.save("mcap", "application/octet-stream", recording);
   }
 
+  /** @param {Robot | null} robot */
   draw(robot) {
     this.parts.csv.disabled = this.parts.mcap.disabled = !robot || this.isSaving;
   }
 
-  /** Hands what the station keeps of the chosen time to the reader as a file. */
+  /**
+   * Hands what the station keeps of the chosen time to the reader as a file.
+   *
+   * @param {string} ending
+   * @param {string} type
+   * @param {(query: Query) => Promise<BlobPart>} content
+   */
   async save(ending, type, content) {
     const robot = this.robot();
     if (!robot || this.isSaving) return;
@@ -54,9 +71,14 @@ export class Save {
   }
 }
 
+/** @param {Query} query */
 const table = async (query) => (await ask("states.csv", query)).blob();
 
-/** The figures of the table, and what happened meanwhile. */
+/**
+ * The figures of the table, and what happened meanwhile.
+ *
+ * @param {Query} query
+ */
 async function recording(query) {
   const states = (await lines("states", query)).map(({ at_ms: at, ...value }) => ({ at, value }));
   const events = entries(await lines("events", query)).map(({ at, kind, words, values }) => ({ at, value: { kind, words, values } }));

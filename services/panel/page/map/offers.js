@@ -53,7 +53,7 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
     const act = why ? undefined : () => fetch(id, hand);
     if (shown.gone.has(id)) {
       const delivery = wasDelivered(shown, id);
-      const was = delivery?.at !== undefined ? say("delivered_at", clock(delivery.at)) : say("away");
+      const was = delivery ? say("delivered_at", clock(delivery.at)) : say("away");
       return { what: `${what}, ${was}`, does: why ? undefined : say("does_ask_back"), why, act };
     }
     const after = shown.queue.filter(({ order }) => order !== shown.state.order).length;

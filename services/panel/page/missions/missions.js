@@ -1,5 +1,11 @@
 // What is fetched: the order under way, the queue, all goods, what the hands at the goods say, what was delivered.
 
+/** @import { Hand, Offer, Tile } from "../map/offers.js" */
+/** @import { Delivered } from "../station/jobs.js" */
+/** @import { Link } from "../station/link.js" */
+/** @import { Order as Waiting, Product, Robot, Warehouse } from "../station/robot.js" */
+/** @import { Known } from "./legs.js" */
+
 import { turnOf, wasDelivered } from "../map/goods.js";
 import { PLAIN, reason, sentence } from "../words/sentences.js";
 import { clock, put, say } from "../words/words.js";
@@ -13,22 +19,65 @@ import { Tiles } from "./tiles.js";
 /** Whoever orders the same goods again within this time has clicked twice, or holds Enter. */
 const TWICE_MS = 700;
 
+/**
+ * What stands in the view.
+ *
+ * @typedef {{ fetch: HTMLFormElement } & Record<"goods" | "picks", HTMLInputElement> & Record<"pastGoods" | "pastTime", HTMLSelectElement>
+ *   & Record<"picked" | "pickedForce" | "backYes" | "backNo" | "clear" | "undo" | "orderCancel", HTMLButtonElement>
+ *   & Record<"tiles" | "plain" | "back" | "backSaid" | "said" | "head" | "queue" | "rest" | "order" | "orderNumber" | "orderName" | "orderWhere"
+ *     | "orderTime" | "orderSteps" | "past" | "pastOpen" | "pastTotals" | "history", HTMLElement>} Parts
+ */
+
 export class Missions {
-  /** `isArmed` says whether the arrows drive, `isOpen` whether this view is seen; `offers` as on the map. */
+  /**
+   * @param {Link} link
+   * @param {Parts} parts
+   * @param {() => Robot | null} robot
+   * @param {object} page
+   * @param {(tile: Tile) => Offer} page.offers as on the map
+   * @param {() => boolean} page.isArmed whether the arrows drive
+   * @param {() => boolean} page.isOpen whether this view is seen
+   */
   constructor(link, parts, robot, { offers, isArmed, isOpen }) {
-    Object.assign(this, { link, parts, robot, isOpen });
-    /** Goods of the warehouse, and number and name of each, by their number. */
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
+    this.isOpen = isOpen;
+    /** @type {Warehouse | null} */
+    this.warehouse = null;
+    /**
+     * Goods of the warehouse by their number.
+     *
+     * @type {Map<string, Product>}
+     */
     this.goods = new Map();
+    /**
+     * Number and name of each.
+     *
+     * @type {Map<string, string>}
+     */
     this.names = new Map();
     this.number = Date.now() % 1_000_000_000;
-    /** What was ordered last, of which robot and when; one press is one order. */
-    this.ordered = { at: -Infinity };
-    /** What was taken out of a robot's queue last: its products, and how many waited behind. */
+    /**
+     * What was ordered last, of which robot and when; one press is one order.
+     *
+     * @type {{ robot: Robot | null, product: string, at: number, waits: boolean } | null}
+     */
+    this.ordered = null;
+    /**
+     * What was taken out of a robot's queue last: its products, and how many waited behind.
+     *
+     * @type {{ robot: Robot, products: string[], behind: number } | null}
+     */
     this.taken = null;
-    /** What past orders teach, and from which. */
-    this.learned = {};
+    /**
+     * What past orders teach, and from which.
+     *
+     * @type {{ done: Delivered[], count: number, after: number | undefined, known: Known } | null}
+     */
+    this.learned = null;
     this.order = new Order({ card: parts.order, number: parts.orderNumber, name: parts.orderName, where: parts.orderWhere, time: parts.orderTime, steps: parts.orderSteps });
-    this.queue = new Queue(parts.queue, { isArmed, move: (...where) => this.move(...where), cancel: (order) => this.cancel(order) });
+    this.queue = new Queue(parts.queue, { isArmed, move: (order, before) => this.move(order, before), cancel: (order) => this.cancel(order) });
     this.tiles = new Tiles({ form: parts.fetch, field: parts.goods, tiles: parts.tiles, said: parts.said }, {
       offers, isOff: () => isArmed() || !isOpen(),
     });
@@ -42,36 +91,52 @@ export class Missions {
     };
     parts.picked.onclick = () => this.act("picked");
     parts.pickedForce.onclick = () => this.act("picked force");
-    /** The goods that a person is asked about: they were not in their place. */
+    /**
+     * The goods that a person is asked about: they were not in their place.
+     *
+     * @type {{ robot: Robot, product: string } & Hand | null}
+     */
     this.asked = null;
     parts.backYes.onclick = () => this.back();
     parts.backNo.onclick = () => this.leave();
-    parts.clear.onclick = () => this.takeBack("clear", waiting(this.robot()));
+    parts.clear.onclick = () => this.takeBack("clear", waiting(this.robot()).map(({ product }) => product));
     parts.undo.onclick = () => this.undo();
     this.plain = PLAIN.map((action) => {
       const button = Object.assign(document.createElement("button"), { type: "button", id: `do-${action}` });
       button.onclick = () => this.act(action);
-      return button;
+      return { action, button };
     });
-    parts.plain.append(...this.plain);
+    parts.plain.append(...this.plain.map(({ button }) => button));
   }
 
-  /** Has a robot do something; `said` is where it says why not. */
+  /**
+   * Has a robot do something; `said` is where it says why not.
+   *
+   * @param {string} action
+   * @returns {Promise<boolean>} whether it is done
+   */
   async act(action, robot = this.robot(), said = this.parts.said) {
-    if (!robot) return put(said, say("no_robot"));
+    if (!robot) {
+      put(said, say("no_robot"));
+      return false;
+    }
     const answer = await this.link.act(robot, action);
     put(said, answer.refused ? reason(answer.refused) : "");
     return !answer.refused;
   }
 
-  /** Orders goods from the form, or from what stands `beside` it, which says in `said` why not. */
-  async fetch(product, { beside = this.parts.fetch, said = this.parts.said } = {}) {
+  /**
+   * Orders goods.
+   *
+   * @param {string} product
+   * @param {Hand} hand where a person is asked, and told why not
+   */
+  async fetch(product, { beside, said }) {
     const [robot, at] = [this.robot(), performance.now()];
     // What was delivered is not fetched again before a person has put it back.
     if (robot?.gone.has(product) && turnOf(robot, product) < 0) return this.ask({ robot, product, beside, said });
     const { ordered } = this;
-    const isTwice = ordered.robot === robot && ordered.product === product && (ordered.waits || at - ordered.at < TWICE_MS);
-    if (isTwice) {
+    if (ordered?.robot === robot && ordered.product === product && (ordered.waits || at - ordered.at < TWICE_MS)) {
       ordered.at = at;
       return;
     }
@@ -81,7 +146,11 @@ export class Missions {
     order.waits = false;
   }
 
-  /** Asks where the hand was whether goods are in their place again. */
+  /**
+   * Asks where the hand was whether goods are in their place again.
+   *
+   * @param {{ robot: Robot, product: string } & Hand} asked
+   */
   ask(asked) {
     const { robot, product, beside } = asked;
     const { back, backSaid, backNo } = this.parts;
@@ -101,6 +170,7 @@ export class Missions {
 
   /** They are back: the robot is told so, and fetches them. */
   async back() {
+    if (!this.asked) return;
     const { robot, product, beside, said } = this.asked;
     this.leave();
     if (!(await this.act(`back ${product}`, robot, said))) return;
@@ -109,7 +179,11 @@ export class Missions {
     await this.fetch(product, { beside, said });
   }
 
-  /** Takes an order out, be it under way or waiting. */
+  /**
+   * Takes an order out, be it under way or waiting.
+   *
+   * @param {string | undefined} order
+   */
   cancel(order) {
     const robot = this.robot();
     if (!robot || order === undefined) return;
@@ -117,11 +191,16 @@ export class Missions {
     const at = orders.findIndex((one) => one.order === order);
     // Ordered anew, what was under way comes before all that wait but the first, which is under way by then.
     const behind = at < 0 ? Math.max(0, orders.length - 1) : orders.length - 1 - at;
-    const product = at < 0 ? robot.state.product : orders[at].product;
-    this.takeBack(`cancel ${order}`, [{ order, product }], behind);
+    const product = orders[at]?.product ?? robot.state.product;
+    this.takeBack(`cancel ${order}`, product === undefined ? [] : [product], behind);
   }
 
-  /** Puts an order before another one, or with null at the end. Where it then stands the robot says. */
+  /**
+   * Puts an order before another one, or with null at the end. Where it then stands the robot says.
+   *
+   * @param {string} order
+   * @param {string | null} before
+   */
   async move(order, before) {
     const robot = this.robot();
     for (const one of ups(waiting(robot).map((one) => one.order), order, before)) {
@@ -129,15 +208,22 @@ export class Missions {
     }
   }
 
-  /** Takes orders out of the queue; `gone` are those, `behind` those that wait behind them. */
-  async takeBack(action, gone, behind = 0) {
+  /**
+   * Takes orders out of the queue.
+   *
+   * @param {string} action
+   * @param {string[]} products whose orders those are
+   * @param {number} behind how many wait behind them
+   */
+  async takeBack(action, products, behind = 0) {
     const robot = this.robot();
-    if (!(await this.act(action)) || !gone.length) return;
-    this.taken = { robot, products: gone.map(({ product }) => product), behind };
+    if (!robot || !(await this.act(action)) || !products.length) return;
+    this.taken = { robot, products, behind };
   }
 
   /** Orders anew what was taken out, and moves it to where it was. */
   async undo() {
+    if (!this.taken) return;
     const { robot, products, behind } = this.taken;
     this.taken = null;
     for (const product of products) {
@@ -147,9 +233,10 @@ export class Missions {
     }
   }
 
+  /** @param {Warehouse | null} warehouse */
   setWarehouse(warehouse) {
     this.warehouse = warehouse;
-    this.learned = {};
+    this.learned = null;
     const goods = warehouse?.product ?? [];
     this.goods = new Map(goods.map((one) => [String(one.id), one]));
     this.names = new Map(goods.map(({ id, name = "" }) => [String(id), `${id} ${name}`.trim()]));
@@ -157,40 +244,48 @@ export class Missions {
     this.past.setNames(this.names);
   }
 
+  /**
+   * @param {Robot | null} robot
+   * @param {number} now
+   */
   draw(robot, now) {
     // Another robot, or the goods are back: the question is over.
     if (this.asked && (robot !== this.asked.robot || !robot.gone.has(this.asked.product))) this.leave();
     if (!this.isOpen()) return;
     this.past.draw(robot, now);
     this.drawOrders(robot, now);
-    this.tiles.draw(robot, !this.link.mayDrive || robot?.isStale(now));
+    this.tiles.draw(robot, !this.link.mayDrive || Boolean(robot?.isStale(now)));
     const { picks, picked, undo } = this.parts;
-    this.plain.forEach((button, at) => {
-      put(button, sentence(`do_${PLAIN[at]}`));
+    for (const { action, button } of this.plain) {
+      put(button, sentence(`do_${action}`) ?? action);
       button.disabled = !this.link.mayDrive;
-    });
+    }
     undo.hidden = !this.taken || this.taken.robot !== robot;
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";
     picks.disabled = pick === undefined || !this.link.mayDrive;
-    picked.parentElement.hidden = !(robot?.state.phase === "picking" && (pick === "manual" || robot.state.remedy !== undefined));
+    picked.parentElement?.toggleAttribute("hidden", !(robot?.state.phase === "picking" && (pick === "manual" || robot.state.remedy !== undefined)));
   }
 
+  /**
+   * @param {Robot | null} robot
+   * @param {number} now
+   */
   drawOrders(robot, now) {
     const { head, clear } = this.parts;
     const orders = waiting(robot);
     const { product, mode, stopped } = robot?.state ?? {};
-    const [known, time] = [robot && this.known(robot.jobs.done), this.link.now()];
-    const isGoing = robot && !robot.isStale(now) && mode === "autonomous" && stopped !== "1";
-    this.order.draw(robot, product, this.goods.get(product) ?? {}, isGoing ? known : null, time);
-    const first = !isGoing ? null : product === undefined ? 0 : left(jobOf(robot, product), known, time);
+    const time = this.link.now();
+    const known = robot && !robot.isStale(now) && mode === "autonomous" && stopped !== "1" ? this.known(robot.jobs.done) : null;
+    this.order.draw(robot, this.goods.get(product ?? ""), known, time);
+    const first = !robot || !known ? null : product === undefined ? 0 : left(jobOf(robot, product), known, time);
     const isAway = product !== undefined || robot?.state.phase === "returning";
-    const ms = isGoing ? waits(first, orders.map(({ product }) => product), known, isAway) : [];
+    const ms = known ? waits(first, orders.map(({ product }) => product), known, isAway) : [];
     const rows = orders.map(({ order, product }, at) => ({
       order, product, ms: ms[at] ?? null,
       name: this.goods.get(product)?.name || say("goods_numbered", product),
-      who: robot.jobs.asked.get(order)?.who,
-      putOff: robot.jobs.putOff.get(product),
+      who: robot?.jobs.asked.get(order)?.who,
+      putOff: robot?.jobs.putOff.get(product),
     }));
     this.queue.draw(rows, this.link.me, this.link.mayDrive);
     put(head, orders.length ? say("queue_head", orders.length, this.goods.size) : say("queue_empty"));
@@ -200,18 +295,26 @@ export class Missions {
     if (this.parts.orderCancel.title !== label) Object.assign(this.parts.orderCancel, { title: label, ariaLabel: label });
   }
 
-  /** What past orders teach; it is learned anew when another one is delivered. */
+  /**
+   * What past orders teach; it is learned anew when another one is delivered.
+   *
+   * @param {Delivered[]} done
+   */
   known(done) {
-    const { done: before, count, after } = this.learned;
-    const last = done[0]?.next ?? done[0]?.back;
-    if (before !== done || count !== done.length || after !== last) {
-      this.learned = { done, count: done.length, after: last, known: learn(done, (product) => crossingsTo(this.warehouse, product)) };
-    }
-    return this.learned.known;
+    const [{ learned }, count, after] = [this, done.length, done[0]?.next ?? done[0]?.back];
+    if (learned?.done === done && learned.count === count && learned.after === after) return learned.known;
+    const known = learn(done, (product) => crossingsTo(this.warehouse, product));
+    this.learned = { done, count, after, known };
+    return known;
   }
 }
 
-/** The orders that wait; the one under way may be listed with them. */
+/**
+ * The orders that wait; the one under way may be listed with them.
+ *
+ * @param {Robot | null} robot
+ * @returns {Waiting[]}
+ */
 function waiting(robot) {
-  return (robot?.queue ?? []).filter(({ order }) => order !== robot.state.order);
+  return (robot?.queue ?? []).filter(({ order }) => order !== robot?.state.order);
 }

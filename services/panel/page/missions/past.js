@@ -1,5 +1,9 @@
 // What was delivered, from the station's history: the same for every browser, and after a reload.
 
+/** @import { Delivered } from "../station/jobs.js" */
+/** @import { Link } from "../station/link.js" */
+/** @import { Robot } from "../station/robot.js" */
+
 import { Jobs } from "../station/jobs.js";
 import { lines, why } from "../station/history.js";
 import { entries } from "../time/kept.js";
@@ -10,26 +14,45 @@ import { fill, item } from "../parts/list.js";
 /** An answer that did not come is asked for again after this time, in ms. */
 const AGAIN_MS = 10_000;
 
+/** @type {Delivered[]} */
 const NONE = [];
 
 export class Past {
-  /** `open` shows `list` with its filters and hides `rest`. */
+  /**
+   * `open` shows `list` with its filters and hides `rest`.
+   *
+   * @param {Pick<Link, "now">} link
+   * @param {Record<"open" | "box" | "rest" | "totals" | "list", HTMLElement> & Record<"goods" | "time", HTMLSelectElement>} parts
+   */
   constructor(link, parts) {
-    Object.assign(this, { link, parts });
+    this.link = link;
+    this.parts = parts;
     const { open, box, rest, goods, time } = parts;
     open.onclick = () => {
       const isOpen = box.hidden;
       box.hidden = !isOpen;
       rest.hidden = isOpen;
-      open.setAttribute("aria-expanded", isOpen);
+      open.ariaExpanded = String(isOpen);
       if (isOpen) this.show();
     };
     for (const filter of [goods, time]) filter.onchange = () => this.show();
-    this.jobs = [];
+    this.jobs = NONE;
+    /** @type {Map<string, string>} */
     this.names = new Map();
+    /**
+     * What is shown, and of which orders.
+     *
+     * @type {string | null}
+     */
+    this.shown = null;
+    this.shownOf = NONE;
   }
 
-  /** The goods that can be chosen. */
+  /**
+   * The goods that can be chosen.
+   *
+   * @param {Map<string, string>} names by their numbers
+   */
   setNames(names) {
     this.names = names;
     this.shown = null;
@@ -41,6 +64,10 @@ export class Past {
     if (names.has(value)) goods.value = value;
   }
 
+  /**
+   * @param {Robot | null} robot
+   * @param {number} now
+   */
   draw(robot, now) {
     this.jobs = robot?.jobs.done ?? NONE;
     // The newest come first.
@@ -51,7 +78,11 @@ export class Past {
     this.show();
   }
 
-  /** Today by the station's clock. */
+  /**
+   * Today by the station's clock.
+   *
+   * @param {Delivered} job
+   */
   isToday({ at }) {
     return at >= new Date(this.link.now()).setHours(0, 0, 0, 0);
   }
@@ -60,7 +91,8 @@ export class Past {
     const { goods, time, totals, list } = this.parts;
     const shown = [goods.value, time.value, this.jobs.length, this.jobs[0]?.at, new Date(this.link.now()).getDate(), document.documentElement.lang].join();
     if (this.shown === shown && this.shownOf === this.jobs) return;
-    Object.assign(this, { shown, shownOf: this.jobs });
+    this.shown = shown;
+    this.shownOf = this.jobs;
     const jobs = this.jobs.filter((job) => (!goods.value || job.product === goods.value) && (time.value !== "today" || this.isToday(job)));
     const all = this.jobs.filter((job) => !goods.value || job.product === goods.value);
     put(totals, say("past_totals", all.filter((job) => this.isToday(job)).length, all.length));
@@ -68,7 +100,12 @@ export class Past {
   }
 }
 
-/** Puts together what the station's history tells of a robot and what this page has heard. */
+/**
+ * Puts together what the station's history tells of a robot and what this page has heard.
+ *
+ * @param {Robot} robot
+ * @param {number} now
+ */
 async function recall(robot, now) {
   const { jobs } = robot;
   jobs.recalled = now;
@@ -87,7 +124,12 @@ async function recall(robot, now) {
   }
 }
 
-/** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
+/**
+ * One delivery as a line: when, what, how long it took, and which ways were blocked on it.
+ *
+ * @param {Delivered} job
+ * @param {Map<string, string>} names
+ */
 function delivered({ product, at, began, detours }, names) {
   const name = names.get(product) ?? product;
   const words = [clock(at), began === undefined ? name : say("took", name, span(at - began))];

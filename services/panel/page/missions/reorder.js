@@ -1,5 +1,7 @@
 // What moves an order in the robot's queue, and which goods a person means by what was typed. Pure.
 
+/** @import { Product } from "../station/robot.js" */
+
 /**
  * The orders that are moved up, one after the other, so that `order` stands before `before`; null: at the end.
  * @param {string[]} orders as they wait
@@ -17,18 +19,19 @@ export function ups(orders, order, before) {
 
 /**
  * The goods that this text means: their number, their name, else all whose name has it or whose number begins so.
- * @template {{ id: number, name?: string }} Goods
+ *
+ * @template {Pick<Product, "id" | "name">} Goods
  * @param {Goods[]} goods
  * @param {string} text
  * @returns {Goods[]}
  */
 export function matches(goods, text) {
   const wanted = text.trim().toLocaleLowerCase();
+  /** @param {Goods} one */
   const name = (one) => (one.name ?? "").toLocaleLowerCase();
   const alike = goods.filter((one) => name(one).includes(wanted) || String(one.id).startsWith(wanted));
-  for (const is of [(one) => String(one.id) === wanted, (one) => name(one) === wanted]) {
-    const exact = wanted ? goods.filter(is) : [];
-    if (exact.length) return exact;
-  }
-  return alike;
+  if (!wanted) return alike;
+  const [byNumber, byName] = [alike.filter((one) => String(one.id) === wanted), alike.filter((one) => name(one) === wanted)];
+  if (byNumber.length) return byNumber;
+  return byName.length ? byName : alike;
 }

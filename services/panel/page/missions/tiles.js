@@ -1,6 +1,9 @@
 // All goods as tiles, of which a click orders one, and the field that finds them by number or name. What a tile does
 // is said where the map's clicks are (map/offers.js).
 
+/** @import { Offer, Tile } from "../map/offers.js" */
+/** @import { Product, Robot } from "../station/robot.js" */
+
 import { turnOf } from "../map/goods.js";
 import { parcel } from "../parts/parcel.js";
 import { isText } from "../bar/stop.js";
@@ -11,11 +14,27 @@ import { matches } from "./reorder.js";
 const SOME = 3;
 
 export class Tiles {
-  /** `offers` says what goods are and what a click does; `isOff` says whether keys are others'. */
+  /**
+   * @param {{ form: HTMLFormElement, field: HTMLInputElement, tiles: HTMLElement, said: HTMLElement }} parts
+   * @param {object} page
+   * @param {(tile: Tile) => Offer} page.offers says what goods are and what a click does
+   * @param {() => boolean} page.isOff whether keys are others'
+   */
   constructor({ form, field, tiles, said }, { offers, isOff }) {
-    Object.assign(this, { form, field, tiles, said, offers });
+    this.form = form;
+    this.field = field;
+    this.tiles = tiles;
+    this.said = said;
+    this.offers = offers;
+    /** @type {Product[]} */
     this.goods = [];
+    /**
+     * By the numbers of the goods.
+     *
+     * @type {Map<string, HTMLButtonElement>}
+     */
     this.buttons = new Map();
+    this.shown = "";
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.submit();
@@ -28,7 +47,7 @@ export class Tiles {
     });
   }
 
-  /** @param {{ id: number, name?: string }[]} goods */
+  /** @param {Product[]} goods */
   setGoods(goods) {
     this.goods = goods;
     this.buttons = new Map(goods.map(({ id, name }) => [String(id), this.tile(String(id), name)]));
@@ -36,6 +55,10 @@ export class Tiles {
     this.find();
   }
 
+  /**
+   * @param {string} id
+   * @param {string} [name]
+   */
   tile(id, name) {
     const button = document.createElement("button");
     button.type = "button";
@@ -56,11 +79,19 @@ export class Tiles {
     act?.();
   }
 
-  /** What a click on the tile does now. */
+  /**
+   * What a click on the tile does now.
+   *
+   * @param {string} id
+   */
   offer(id) {
     return this.offers({ kind: "good", id, hand: { beside: this.form, said: this.said } });
   }
 
+  /**
+   * @param {Robot | null} robot
+   * @param {boolean} isOld
+   */
   draw(robot, isOld) {
     const { state, queue, gone, jobs } = robot ?? {};
     const shown = JSON.stringify([robot?.name, isOld, state?.product, state?.phase, queue, [...(gone ?? [])], jobs?.done[0]?.at, this.goods, document.documentElement.lang]);
@@ -74,8 +105,8 @@ export class Tiles {
       const said = `${what}: ${why ?? does}`;
       if (button.title === said) continue;
       button.title = said;
-      button.setAttribute("aria-label", said);
-      button.setAttribute("aria-disabled", Boolean(why));
+      button.ariaLabel = said;
+      button.ariaDisabled = String(Boolean(why));
     }
   }
 
@@ -85,7 +116,8 @@ export class Tiles {
     const found = matches(this.goods, value);
     for (const [id, button] of this.buttons) button.hidden = !found.some((one) => String(one.id) === id);
     if (!value.trim()) return;
-    put(this.said, found.length ? (found.length > 1 ? "" : say("search_one", title(found[0]))) : say("search_none"));
+    const [one] = found;
+    put(this.said, one ? (found.length > 1 ? "" : say("search_one", title(one))) : say("search_none"));
   }
 
   /** Orders what is meant, if that is one. */
@@ -97,11 +129,13 @@ export class Tiles {
     const found = matches(this.goods, text);
     const some = found.slice(0, SOME).map(title).join(", ");
     if (found.length > 1) return put(said, say("search_many", found.length > SOME ? `${some} …` : some));
-    if (!found.length) return put(said, say("search_none"));
+    const [one] = found;
+    if (!one) return put(said, say("search_none"));
     field.value = "";
     this.find();
-    this.order(String(found[0].id));
+    this.order(String(one.id));
   }
 }
 
+/** @param {Product} goods */
 const title = ({ id, name }) => `${id} ${name ?? ""}`.trim();

@@ -2,10 +2,10 @@
 
 import { put } from "../words/words.js";
 
-/** @returns {HTMLElement} */
+/** @param {string} id */
 export function parcel(id) {
   const element = document.createElement("span");
   element.className = "parcel";
-  put(element, String(id));
+  put(element, id);
   return element;
 }

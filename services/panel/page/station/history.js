@@ -1,13 +1,22 @@
 // What the station keeps of the last day (services/panel/src/history.rs).
 
+/** @typedef {{ at_ms: number, line: string }} Told A line that the station has heard, and when, in ms since 1970. */
+/** @typedef {{ at_ms: number } & Record<string, number | string | null>} Row A row of the table of states. */
+/**
+ * What it says in lines, and what each line is.
+ *
+ * @typedef {{ states: Row, events: Told, lines: Told, moment: Told }} Answers
+ */
+/** @typedef {Record<string, string | number>} Query Which robot, and what of it. */
+
 /** The station gives nothing of its history; the message is the word for why. */
 class Refused extends Error {}
 
 /**
  * What the station's history says.
  *
- * @param {string} what `states.csv`, `states`, `events`, `lines` or `moment`
- * @param {Record<string, string | number>} query which robot, and what of it
+ * @param {keyof Answers | "states.csv"} what
+ * @param {Query} query
  * @returns {Promise<Response>}
  */
 export async function ask(what, query) {
@@ -21,9 +30,10 @@ export async function ask(what, query) {
 /**
  * The same, an object from each line.
  *
- * @param {string} what
- * @param {Record<string, string | number>} query
- * @returns {Promise<any[]>}
+ * @template {keyof Answers} What
+ * @param {What} what
+ * @param {Query} query
+ * @returns {Promise<Answers[What][]>}
  */
 export async function lines(what, query) {
   const text = await (await ask(what, query)).text();

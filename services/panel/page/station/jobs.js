@@ -1,28 +1,44 @@
 // The orders that a robot has begun, by its events: what was fetched when, and how far the one under way has come.
 // What is told twice, by the station's history and on a new connection, counts once. Pure: entries in, orders out.
 
+/** @import { Entry, Fields } from "./robot.js" */
+
 /** What is told again of an order is told with a time that is this near to the first one, in ms. */
 const SAME_MS = 10_000;
 /** A crossing that is told again is told within this time; no two are so near, in ms. */
 const CROSSING_MS = 500;
 
+/** @typedef {{ at: number, who: string }} Asked When and by whom an order was given at a page. */
+/** @typedef {"began" | "arrived" | "picked" | "at" | "back" | "next"} Step */
 /**
- * One order. Times are in ms by this page's clock; one that nobody has told is missing.
- * @typedef {{ product: string, order: string, asked?: { at: number, who: string }, began?: number, arrived?: number,
- *   picked?: number, at?: number, back?: number, next?: number, detours: { node: string, looks: string, at: number }[],
- *   passed?: number, legs: number[] }} Job
- * @typedef {import("./robot.js").Entry} Entry
+ * One order. Times are in ms since 1970; one that nobody has told is missing.
+ *
+ * @typedef {{ product: string, order: string, asked?: Asked | undefined, passed?: number, legs: number[],
+ *   detours: { node: string, looks: string, at: number }[] } & Partial<Record<Step, number>>} Job
  */
+/** @typedef {Job & { at: number }} Delivered */
 
 export class Jobs {
   constructor() {
-    /** @type {Job[]} What was delivered, the newest first. */
+    /**
+     * What was delivered, the newest first.
+     *
+     * @type {Delivered[]}
+     */
     this.done = [];
     /** @type {Job | null} */
     this.now = null;
-    /** When and by whom orders were given at a page, by their numbers. */
+    /**
+     * By the numbers of the orders.
+     *
+     * @type {Map<string, Asked>}
+     */
     this.asked = new Map();
-    /** Why orders that wait were put off, by their goods: the kind of the thought that said so. */
+    /**
+     * Why orders that wait were put off, by their goods: the kind of the thought that said so.
+     *
+     * @type {Map<string, string>}
+     */
     this.putOff = new Map();
     /** When the station's history was asked for what came before; for good once it is in it. */
     this.recalled = -Infinity;
@@ -35,11 +51,19 @@ export class Jobs {
     else if (kind === "thought" && values) this.thought(at, values);
   }
 
-  ask(at, [who, what, order]) {
+  /**
+   * @param {number} at
+   * @param {string[]} words
+   */
+  ask(at, [who = "", what, order = ""]) {
     if (what === "order" && !this.asked.has(order)) this.asked.set(order, { at, who });
   }
 
-  event(at, [what, x, y, order, product, looks]) {
+  /**
+   * @param {number} at
+   * @param {string[]} words
+   */
+  event(at, [what, x, y, order = "", product = "", looks = ""]) {
     if (what === "getting_item") return this.begin(at, order, product);
     if (what === "item_delivered") return this.deliver(at, order, product);
     const job = this.now;
@@ -54,6 +78,11 @@ export class Jobs {
     }
   }
 
+  /**
+   * @param {number} at
+   * @param {string} order
+   * @param {string} product
+   */
   begin(at, order, product) {
     const [last] = this.done;
     const isTold = [this.now, ...this.done].some((job) => job?.order === order && Math.abs(at - (job.began ?? -Infinity)) < SAME_MS);
@@ -63,14 +92,23 @@ export class Jobs {
     this.now = { product, order, asked: this.asked.get(order), began: at, passed: at, detours: [], legs: [] };
   }
 
+  /**
+   * @param {number} at
+   * @param {string} order
+   * @param {string} product
+   */
   deliver(at, order, product) {
-    if (this.done.some((job) => job.order === order && Math.abs(at - (job.at ?? -Infinity)) < SAME_MS)) return;
+    if (this.done.some((job) => job.order === order && Math.abs(at - job.at) < SAME_MS)) return;
     const job = this.now?.product === product ? this.now : { product, order, detours: [], legs: [] };
     this.done.unshift({ ...job, at });
     this.now = null;
   }
 
-  thought(at, { kind, product }) {
+  /**
+   * @param {number} at
+   * @param {Fields} values
+   */
+  thought(at, { kind = "", product = "" }) {
     const job = this.now;
     const isIts = job?.product === product;
     if (kind === "has_goods" && isIts) {

@@ -23,7 +23,8 @@ import { Frames } from "./quantile.js";
  *   "time_ms" | "x_mm" | "y_mm" | "heading_deg" | "unsure_mm" | "node" | "looks" | "next" | "phase" | "hold" | "failure"
  *   | "failure_expected" | "failure_seen" | "remedy" | "mode" | "pick" | "stopped" | "stop_cause" | "stop_by" | "stop"
  *   | "stop_age_ms" | "stood_ms" | "order" | "product" | "delivered" | "line_bits" | "line_error" | "distance_cm"
- *   | "left_duty" | "right_duty" | "code" | "servos" | "loads" | "servo_errors" | "battery_dv" | "sensor_up" | "steering_up"
+ *   | "left_duty" | "right_duty" | "code" | "servos" | "loads" | "servo_errors" | "battery_dv" | "battery_percent"
+ *   | "battery_left_s" | "sensor_up" | "steering_up"
  *   | "sensor_lost" | "steering_lost" | "bus_lost" | "gain_p" | "gain_d", string>>} State
  */
 /** @typedef {Partial<Record<string, string>>} Fields What stands in a line as `key=value`. */

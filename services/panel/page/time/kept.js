@@ -1,5 +1,9 @@
 // What has happened to the robot in view: what the station tells a page, and what was fetched of the time before that.
 
+/** @import { Link } from "../station/link.js" */
+/** @import { Told } from "../station/history.js" */
+/** @import { Entry, Robot } from "../station/robot.js" */
+
 import { lines, why } from "../station/history.js";
 import { note } from "../station/report.js";
 
@@ -14,15 +18,15 @@ const SAME_MS = 500;
 /** What has a mark on the time line. */
 const MARKED = "stopped,item_delivered,failed,pickup_refused,refused";
 
+/** @type {(a: Entry, b: Entry) => boolean} */
 const isSame = (a, b) => Math.abs(a.at - b.at) < SAME_MS && a.kind === b.kind && String(a.words) === String(b.words);
 
 /**
  * Two lists in one, each by its times: of the older one, what is before the newer one.
  *
- * @template {{ at: number, kind: string, words: string[] }} E
- * @param {E[]} older
- * @param {E[]} newer
- * @returns {E[]}
+ * @param {Entry[]} older
+ * @param {Entry[]} newer
+ * @returns {Entry[]}
  */
 function joined(older, newer) {
   if (!older.length) return newer;
@@ -34,36 +38,57 @@ function joined(older, newer) {
 /**
  * Entries of the log from lines of the station's history.
  *
- * @param {{ at_ms: number, line: string }[]} told
+ * @param {Told[]} told
+ * @returns {Entry[]}
  */
 export function entries(told) {
-  const past = { thinks: null, events: [], happened: (entry) => past.events.push(entry) };
-  for (const { at_ms: at, line } of told) {
-    const [word, ...rest] = line.split(" ");
-    note(past, word, rest, at);
-  }
-  return past.events;
+  /** @type {Parameters<typeof note>[0]} */
+  const past = { thinks: null, happened() {} };
+  return told.flatMap(({ at_ms: at, line }) => {
+    const [word = "", ...rest] = line.split(" ");
+    return note(past, word, rest, at) ?? [];
+  });
 }
 
 export class Kept {
+  /** @param {Pick<Link, "now">} link */
   constructor(link) {
     this.link = link;
-    /** What was fetched of the robot of this name. */
-    this.of(null);
-  }
-
-  of(name) {
-    Object.assign(this, { name, fetched: [], marked: null, isAll: false, isFetching: false, list: null, held: null });
+    /**
+     * The robot of which all this is.
+     *
+     * @type {string | null}
+     */
+    this.name = null;
+    /** @type {Entry[]} */
+    this.fetched = [];
+    /**
+     * What has a mark on the time line.
+     *
+     * @type {Entry[] | null}
+     */
+    this.marked = null;
+    /** Whether the station keeps nothing older. */
+    this.isAll = false;
+    this.isFetching = false;
+    /**
+     * All of it, and what it was made of.
+     *
+     * @type {Entry[] | null}
+     */
+    this.list = null;
+    this.held = "";
   }
 
   /**
    * Everything that is known to have happened to a robot, the oldest first; the same list until it changes.
    *
-   * @param {import("../station/robot.js").Robot | null} robot
+   * @param {Robot | null} robot
+   * @returns {Entry[]}
    */
   all(robot) {
     const name = robot?.name ?? null;
-    if (name !== this.name) this.of(name);
+    if (name !== this.name) Object.assign(this, new Kept(this.link), { name });
     const held = robot?.events ?? [];
     const key = [held.length, held[0]?.at, held.at(-1)?.at, this.fetched.length].join();
     if (this.list && this.held === key) return this.list;
@@ -77,7 +102,7 @@ export class Kept {
   /**
    * Fetches what happened before all that is known.
    *
-   * @param {import("../station/robot.js").Robot} robot
+   * @param {Robot} robot
    * @returns {Promise<string | null>} the word for why not
    */
   async earlier(robot) {
@@ -102,7 +127,7 @@ export class Kept {
   /**
    * Fetches what has a mark on the time line.
    *
-   * @param {import("../station/robot.js").Robot} robot
+   * @param {Robot} robot
    * @returns {Promise<boolean>} false if the station keeps no history
    */
   async marks(robot) {

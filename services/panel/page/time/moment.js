@@ -4,6 +4,9 @@
 // Orders go to the live robot. So nobody orders by a map that shows the past, and who drives by hand sees what is now.
 // The address keeps the moment, in UTC, so a page that is loaded anew, and whoever is sent the address, sees the same.
 
+/** @import { Told } from "../station/history.js" */
+/** @import { Link } from "../station/link.js" */
+
 import { face } from "../bar/face.js";
 import { lines, why } from "../station/history.js";
 import { report } from "../station/report.js";
@@ -16,6 +19,7 @@ const REST_MS = 200;
 /** What is refused because others ask is asked again after this time, in ms. */
 const AGAIN_MS = 400;
 
+/** @param {number} ms */
 const pause = (ms) =>
   new Promise((end) => {
     setTimeout(end, ms);
@@ -25,7 +29,7 @@ const pause = (ms) =>
  * A robot as it was at a moment.
  *
  * @param {Robot} live the robot, which knows what has happened
- * @param {{ at_ms: number, line: string }[]} told what the station tells of it
+ * @param {Told[]} told what the station tells of it
  * @param {number} at the moment in ms since 1970
  * @param {number} ahead how far that clock is ahead of the page's
  * @returns {Robot}
@@ -52,16 +56,23 @@ export class Moment {
    * @param {() => boolean} isArmed whether somebody drives it by hand from this page
    */
   constructor(link, live, isArmed) {
-    Object.assign(this, { link, live, isArmed });
+    this.link = link;
+    this.live = live;
+    this.isArmed = isArmed;
     /**
      * The moment that is wanted, in ms since 1970; null is now.
      *
      * @type {number | null}
      */
     this.at = null;
-    /** The past robot, the time that it is of by this page's clock, and the word for why there is none. */
+    /**
+     * The past robot, the time that it is of by this page's clock, and the word for why there is none.
+     *
+     * @type {Robot | null}
+     */
     this.past = null;
-    this.then = null;
+    this.then = 0;
+    /** @type {string | null} */
     this.why = null;
     this.isLoading = false;
     this.isNew = false;
@@ -124,7 +135,7 @@ export class Moment {
 
   /** The look of the past robot's state, in the words of the bar. */
   face() {
-    const link = { open: true, me: this.link.me, now: () => this.then + this.link.ahead };
+    const link = { open: true, me: this.link.me, tries: 0, closed: null, now: () => this.then + this.link.ahead };
     return face(link, this.past, this.then);
   }
 
@@ -133,9 +144,12 @@ export class Moment {
     if (this.isLoading) return;
     this.isLoading = true;
     while (this.at !== null && this.isNew) {
+      const live = this.live();
+      // Once it is here, `shown` asks.
+      if (!live) break;
       this.isNew = false;
       try {
-        await this.ask(this.live(), this.at);
+        await this.ask(live, this.at);
         this.why = null;
       } catch (error) {
         const busy = why(error) === "history_busy";
@@ -148,6 +162,10 @@ export class Moment {
     if (this.at === null) this.past = this.why = null;
   }
 
+  /**
+   * @param {Robot} live
+   * @param {number} at
+   */
   async ask(live, at) {
     const robot = live.name;
     const told = await lines("moment", { robot, at });
@@ -160,6 +178,11 @@ export class Moment {
     this.show(live, [...before, ...told], at);
   }
 
+  /**
+   * @param {Robot} live
+   * @param {Told[]} told
+   * @param {number} at
+   */
   show(live, told, at) {
     if (this.at === null) return;
     // The clock may be set while this is shown.
@@ -169,7 +192,11 @@ export class Moment {
   }
 }
 
-/** Keeps the moment in the address. */
+/**
+ * Keeps the moment in the address.
+ *
+ * @param {number | null} at
+ */
 function keep(at) {
   history.replaceState(null, "", location.pathname + location.search + (at === null ? "" : `#at=${new Date(at).toISOString()}`));
 }
