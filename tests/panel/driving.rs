@@ -6,6 +6,7 @@ use serde_json::json;
 
 use crate::Scene;
 use crate::browser::Page;
+use crate::manners::TABS;
 
 /// Presses keys in one step, so that nothing can come between them.
 fn press(page: &mut Page, keys: &[&str]) {
@@ -458,7 +459,7 @@ pub(crate) fn in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_i
     let free = "document.querySelector('#pad').getBoundingClientRect().bottom <= \
         document.querySelector('#stop-place').getBoundingClientRect().top";
     assert_eq!(page.value(free), true, "STOP covers the pad");
-    for tab in ["missions", "drive", "setup", "line", "log"] {
+    for tab in TABS {
         page.click(&format!("#tab-{tab}"));
         page.pause();
         let small = page.value(

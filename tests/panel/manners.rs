@@ -18,7 +18,9 @@ const LOOKS_STOPPED: &str = "(() => { const at = (part) => document.querySelecto
       at('#map .chip text').textContent === 'stands, stopped' && style('#map .chip rect').fill === red && \
       style('#map .robot path').fill === red && style('#map .robot .hatch').visibility === 'visible'; })()";
 
-const TABS: [&str; 5] = ["missions", "drive", "setup", "line", "log"];
+pub(crate) const TABS: [&str; 7] = [
+    "missions", "drive", "signals", "log", "setup", "line", "health",
+];
 
 /// Where STOP is nearer than 16 px to another control or to the screen's edge, so that a person
 /// might miss it. At the foot of a phone its row covers whatever is scrolled below it.
@@ -77,7 +79,8 @@ pub(crate) fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop(
     page.wait_until("document.querySelector('#resume').hidden");
     for (width, height) in [(1280, 720), (1366, 768)] {
         page.dress("light", width, height, false);
-        for tab in TABS {
+        // How long the list of services is, the robot says.
+        for tab in TABS.into_iter().filter(|tab| *tab != "health") {
             page.click(&format!("#tab-{tab}"));
             page.pause();
             let fits = format!(
@@ -323,7 +326,7 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
 
 #[test]
 #[ignore = "axe-core's file is needed, in LAGER_AXE: tests/run"]
-fn an_accessibility_checker_finds_nothing_serious() {
+fn an_accessibility_checker_finds_nothing() {
     let axe = std::env::var_os("LAGER_AXE").expect("LAGER_AXE");
     let axe = std::fs::read_to_string(axe).expect("a file");
     let scene = Scene::new(1.0, &[]);
@@ -343,9 +346,7 @@ fn an_accessibility_checker_finds_nothing_serious() {
             let told: Value = serde_json::from_str(told).expect("JSON");
             assert!(told["passes"].as_u64() > Some(20), "{told}");
             for violation in told["violations"].as_array().expect("a list") {
-                if ["serious", "critical"].contains(&violation["impact"].as_str().unwrap_or("")) {
-                    found.push(format!("{view}, {theme}: {violation}"));
-                }
+                found.push(format!("{view}, {theme}: {violation}"));
             }
         }
     };
@@ -354,6 +355,9 @@ fn an_accessibility_checker_finds_nothing_serious() {
         page.click(&format!("#tab-{tab}"));
         check(&mut page, tab);
     }
+    page.click("#help-open");
+    check(&mut page, "help");
+    page.click("#help-close");
     page.click("#tab-drive");
     page.click("#where-ask");
     check(&mut page, "where it stands");

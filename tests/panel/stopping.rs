@@ -106,7 +106,7 @@ pub(crate) fn one_press_on_fetch_is_one_order(_scene: &mut Scene, page: &mut Pag
     let orders = "sent.filter((line) => / order \\d+ 2$/.test(line)).length";
     wait_for("an order", || {
         page.value(
-        "(() => { const goods = document.querySelector('#goods'); goods.value = '2'; \
+            "(() => { const goods = document.querySelector('#goods'); goods.value = '2'; \
          const fetch = document.querySelector('#fetch [type=submit]'); \
          for (let press = 0; press < 5; press++) fetch.click(); })()",
         );
