@@ -15,6 +15,8 @@ import { Missions } from "./missions/missions.js";
 import { Notify } from "./bar/notify.js";
 import { offers } from "./map/offers.js";
 import { called, reason } from "./words/sentences.js";
+import { Kept } from "./setup/kept.js";
+import { OnMap } from "./setup/onmap.js";
 import { Setup } from "./setup/setup.js";
 import { Strips } from "./signals/strips.js";
 import { change, current, put, say, translate } from "./words/words.js";
@@ -39,11 +41,11 @@ const map = new WarehouseMap(at("map"), {
   words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words) => put(at("map-said"), words),
   tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
   hand: {
-    tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: () => !at("setup").hidden,
+    tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: isSetUp, grip: (target) => (isSetUp() ? onMap.grip(target) : null),
     offers: offers({
       link, robot, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
       fetch: (product) => missions.fetch(product, { beside: at("map-undo"), said: at("map-said") }),
-      goods: (square, side) => setup.place(square, side),
+      isSetUp, setUp: (target) => onMap.offers(target),
     }),
   },
 });
@@ -57,9 +59,17 @@ const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("
 const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
 const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: at("hand-over"), keep: at("keep") }, robot, () => driving.letGo());
 const setup = new Setup(link, {
-  form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
+  form: at("warehouse"), products: at("products"), add: at("add-product"), said: at("setup-said"), floor: at("floor-size"),
+  undo: at("undo"), redo: at("redo"), undoes: at("undo-what"), unsaved: at("unsaved"), discard: at("discard"),
   saveFile: at("save-file"), loadFile: at("load-file"), mapString: at("map-string"), goodsString: at("goods-string"),
-});
+}, { drawn: drawWarehouse, isOpen: isSetUp });
+const onMap = new OnMap(map, {
+  form: at("rename"), number: at("rename-number"), name: at("rename-name"), move: at("rename-move"), remove: at("rename-remove"), close: at("rename-close"),
+}, { edits: setup.edits, changed: () => setup.fill(), mayEdit: () => link.mayDrive });
+map.scaledAnew = () => onMap.draw(isSetUp());
+const kept = new Kept(link, {
+  where: at("kept-where"), robots: at("kept-robots"), ask: at("renew"), box: at("renew-box"), question: at("renew-question"), yes: at("renew-yes"), no: at("renew-no"), said: at("renew-said"),
+}, robot);
 const line = new Line({
   gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), said: at("board-said"),
   calibrate: at("calibrate"), steps: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"),
@@ -71,6 +81,18 @@ const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, 
 const strips = new Strips(at("strips"));
 const notify = new Notify(link, at("notify"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot);
+
+/** Whether the map is the warehouse that is set up, and no robot is told anything by it. */
+function isSetUp() {
+  return !at("setup").hidden;
+}
+
+/** Draws the warehouse that is kept or, while it is set up, the one that it would become. */
+function drawWarehouse() {
+  const warehouse = isSetUp() ? setup.edits.now : link.warehouse;
+  at("map-zone").classList.toggle("empty", !warehouse);
+  map.setWarehouse(warehouse);
+}
 
 /** Puts an obstacle on a way of a simulated world, or takes it away. */
 async function meetWay(edge) {
@@ -130,6 +152,8 @@ at("language").onclick = () => {
   change();
   translate();
   words();
+  setup.draw();
+  map.redraw();
 };
 
 // Space is STOP, so a box is ticked by Enter.
@@ -150,6 +174,7 @@ for (const tab of document.querySelectorAll("[role=tab]")) {
 }
 
 function show(tab) {
+  const wasSetUp = isSetUp();
   document.body.dataset.view = tab.getAttribute("aria-controls");
   for (const other of document.querySelectorAll("[role=tab]")) {
     const chosen = other === tab;
@@ -158,12 +183,16 @@ function show(tab) {
     at(other.getAttribute("aria-controls")).hidden = !chosen;
   }
   driving.letGo();
+  if (wasSetUp === isSetUp()) return;
+  drawWarehouse();
+  map.fit();
 }
 
 /** Words that change with the language or with who looks. */
 function words() {
   at("language").textContent = say("language");
   for (const element of document.querySelectorAll(".driver-only")) element.disabled = !link.mayDrive;
+  setup.draw();
 }
 
 link.addEventListener("robots", () => {
@@ -179,10 +208,9 @@ at("robot").onchange = () => {
   byHand.leave();
 };
 link.addEventListener("warehouse", () => {
-  at("map-zone").classList.toggle("empty", !link.warehouse);
-  map.setWarehouse(link.warehouse);
+  setup.kept(link.warehouse);
+  drawWarehouse();
   missions.setWarehouse(link.warehouse);
-  setup.setWarehouse(link.warehouse);
 });
 link.addEventListener("link", words);
 words();
@@ -239,6 +267,7 @@ function drawRest(shown, time) {
   driving.draw();
   strips.draw(shown);
   line.draw(shown);
+  if (isSetUp()) kept.draw();
   asked.draw(shown);
   byHand.draw(shown);
   log.draw(shown);
@@ -248,7 +277,7 @@ function drawRest(shown, time) {
   put(at("control"), say(...seat));
   // Who has the wheel is not known until the robot is heard again.
   at("control").disabled = !link.open || !shown?.connected;
-  if (!link.warehouse) tell("no_map");
+  if (!map.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
 /** The control of this page that ends what is wrong, by the name of the remedy. */

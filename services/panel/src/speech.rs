@@ -11,6 +11,8 @@
 //! take <robot> <number>             take the wheel, or ask the person who drives for it
 //! free <robot> <number>             leave the wheel; the person who has asked gets it
 //! keep <robot> <number>             refuse to hand over the wheel
+//! renew <robot> <number>            stop a simulated robot and put it on the delivery node of the
+//!                                   warehouse that the station has saved
 //! warehouse <number> <json>         describe another warehouse, in the fields of the station's file
 //! here <ms>                         the page is there; once a second
 //! ```
@@ -23,7 +25,10 @@
 //! you <name> driver|viewer          what this page is called and may do; the first line. A person
 //!                                   asks for a name by the socket's address (`/live?name=Anna`)
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
-//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
+//! kept <path>                       where the station keeps it
+//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- uses=<what> renews=0|1 [asks=<name>]
+//!       [age_ms=<int>]              which warehouse it uses: `this`, `told` or `driven` (other goods),
+//!                                   `floor_before`, `world_before` (simulated), or `-`: not known
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>
 //!                                   <what>`: a person here wants an action, `stop`, `take` or `free`
 //! past <robot> <ms> <report>        the same, from that many ms ago
@@ -62,6 +67,8 @@ pub(crate) enum Said {
     Take { robot: Name, number: u32 },
     /// Leave it.
     Free { robot: Name, number: u32 },
+    /// Put a simulated robot into the saved warehouse.
+    Renew { robot: Name, number: u32 },
     /// Keep it, whoever asks.
     Keep { robot: Name, number: u32 },
     /// The page is there.
@@ -104,10 +111,10 @@ pub(crate) fn read(line: &str) -> Result<Said, Unread> {
         "here" => Ok(Said::Here {
             said_ms: read_number(rest)?,
         }),
-        "do" | "stop" | "take" | "free" | "keep" => read_for_robot(word, rest),
+        "do" | "stop" | "take" | "free" | "keep" | "renew" => read_for_robot(word, rest),
         _ => Err(Unread::new(
             None,
-            "a page says do, stop, take, free, keep, warehouse or here",
+            "a page says do, stop, take, free, keep, renew, warehouse or here",
         )),
     }
 }
@@ -168,6 +175,7 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
         ("take", "") => Ok(Said::Take { robot, number }),
         ("free", "") => Ok(Said::Free { robot, number }),
         ("keep", "") => Ok(Said::Keep { robot, number }),
+        ("renew", "") => Ok(Said::Renew { robot, number }),
         _ => Err(Unread::new(
             Some(number),
             "nothing belongs behind the number",

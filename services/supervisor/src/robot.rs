@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use lager_home::{ChanceClock, LockError};
 use lager_ports::BusConfig;
+use lager_stop::StopWord;
+use lager_topics::{Role, StopCause};
 
 use crate::children::{Children, PATIENCE, Start};
 use crate::console;
@@ -54,6 +56,8 @@ pub struct Plan {
     pub eeprom: Option<PathBuf>,
     /// The copy of its warehouse's file, if it runs in one.
     pub warehouse: Option<WarehouseCopy>,
+    /// Makes the world of the warehouse that its own station has saved, if it is simulated.
+    pub renewal: Option<Box<dyn Fn() -> Result<World>>>,
     /// The products that it has to fetch.
     pub mission: Mission,
     /// Its orders, and the file that keeps them for another `up`.
@@ -62,6 +66,16 @@ pub struct Plan {
     pub first_notes: Vec<String>,
     /// Whether to end when the mission has ended.
     pub exit_when_done: bool,
+}
+
+/// Another world for a simulated robot.
+pub struct World {
+    /// The configuration of the robot's processes, in TOML.
+    pub config: String,
+    /// Its warehouse.
+    pub warehouse: WarehouseCopy,
+    /// The products that it has.
+    pub products: Vec<i32>,
 }
 
 /// A robot that is up.
@@ -79,6 +93,8 @@ pub struct Robot {
     terminal: Terminal,
     /// How long the body could have run while services waited for its clock.
     body: Option<ChanceClock>,
+    /// The products of a world that the robot gets now.
+    products: Option<Vec<i32>>,
     began: Instant,
     folder_looked: Instant,
 }
@@ -113,6 +129,7 @@ impl Robot {
             signals,
             terminal,
             body: None,
+            products: None,
             began: now,
             folder_looked: now,
         })
@@ -207,7 +224,40 @@ impl Robot {
         for service in self.children.due() {
             self.happened(Event::Due(service))?;
         }
+        if self.signals.renewal_asked() {
+            self.renew()?;
+        }
         Ok(())
+    }
+
+    /// Puts a simulated robot on the delivery node of the warehouse that its station has saved. It
+    /// stands there until a person releases the stop.
+    fn renew(&mut self) -> Result<()> {
+        let Some(renewal) = &self.plan.renewal else {
+            return Ok(());
+        };
+        let stop = self.lock.stop_word();
+        let world = renewal().and_then(|world| {
+            if !StopWord::read(&stop)?.is_some_and(|told| told.stop().is_some()) {
+                StopWord::set(&stop, Role::Supervisor, StopCause::Ordered)?;
+            }
+            Ok(world)
+        });
+        let world = match world {
+            Ok(world) => world,
+            Err(error) => {
+                self.note(&format!("the robot stays in its warehouse: {error:#}"));
+                return Ok(());
+            }
+        };
+        self.note("the robot is stopped and put on the delivery node of the warehouse that was saved; `lager resume` lets it move");
+        self.children.configure(world.config.clone());
+        self.plan.config = world.config;
+        self.plan.warehouse = Some(world.warehouse);
+        self.products = Some(world.products);
+        let before = "the robot was put into another warehouse in the middle of it";
+        self.plan.mission.give_up(before);
+        self.happened(Event::Renewed)
     }
 
     fn happened(&mut self, event: Event) -> Result<()> {
@@ -264,6 +314,13 @@ impl Robot {
         }
         // Nobody knows the robot's orders any more, and a simulated world is a new one.
         keeping.begin_again();
+        let products = self.products.take();
+        let dropped = products.map(|products| keeping.keep_only(&products));
+        for product in dropped.unwrap_or_default() {
+            self.note(&format!(
+                "the order for product {product} is dropped: it is not in this warehouse"
+            ));
+        }
         self.happened(Event::Restored)
     }
 
@@ -315,7 +372,7 @@ impl Robot {
 
     fn wait(&self) {
         let at_most = self.course.idle(self.now(), LOOK);
-        let mut sources = vec![self.signals.as_fd()];
+        let mut sources = vec![self.signals.as_fd(), self.signals.renewal()];
         sources.extend(self.attendant.line.as_ref().map(AsFd::as_fd));
         self.children.wait(&sources, at_most);
     }

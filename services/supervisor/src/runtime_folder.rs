@@ -186,6 +186,11 @@ impl NameLock {
         self.lock.as_ref().is_some_and(Lock::is_in_place)
     }
 
+    /// The file of the robot's stop word.
+    pub fn stop_word(&self) -> PathBuf {
+        self.folder.join(StopPage::FILE)
+    }
+
     /// Makes sure that others find this robot by its lock.
     pub fn renew(&self) {
         if let Some(lock) = &self.lock {

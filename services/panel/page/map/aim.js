@@ -14,9 +14,12 @@ const OFF_PX = 16;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Aim {
-  /** `offers` says what a thing is and does; `isArmed`, whether the arrows drive. */
-  constructor(map, { tip, offers, isArmed }) {
-    Object.assign(this, { map, tip, offers, isArmed });
+  /**
+   * `offers` says what a thing is and does, `grip` what a drag that begins on it does (`move`, `end`, `cancel`), if
+   * that is not to move the map; `isArmed`, whether the arrows drive.
+   */
+  constructor(map, { tip, offers, grip, isArmed }) {
+    Object.assign(this, { map, tip, offers, grip, isArmed });
     /** What pointer and keys mean now. */
     this.pointed = null;
     this.chosen = null;
@@ -31,6 +34,12 @@ export class Aim {
   gestures(svg) {
     let from = null;
     let moved = 0;
+    let gripped = null;
+    const letGo = (isDone) => {
+      if (isDone && moved >= STILL_PX) gripped?.end();
+      gripped?.cancel();
+      gripped = null;
+    };
     const { map } = this;
     const fingers = new Map();
     const apart = () => {
@@ -42,6 +51,8 @@ export class Aim {
       from = map.point(event);
       // A second finger zooms, so the first one meets nothing.
       moved = fingers.size > 1 ? Infinity : 0;
+      letGo(false);
+      if (fingers.size === 1) gripped = this.grip(this.at(event));
       svg.setPointerCapture(event.pointerId);
     });
     svg.addEventListener("pointermove", (event) => {
@@ -57,15 +68,18 @@ export class Aim {
       moved += Math.hypot(event.movementX, event.movementY);
       if (moved < STILL_PX) return;
       this.point(null);
-      map.shift(from[0] - x, from[1] - y);
+      if (gripped) gripped.move([x, -y]);
+      else map.shift(from[0] - x, from[1] - y);
     });
     svg.addEventListener("pointerup", (event) => {
       fingers.delete(event.pointerId);
       if (from && moved < STILL_PX) this.click(this.at(event), event.timeStamp);
+      letGo(true);
       from = null;
     });
     svg.addEventListener("pointercancel", (event) => {
       fingers.delete(event.pointerId);
+      letGo(false);
       from = null;
     });
     svg.addEventListener("pointerleave", () => this.point(null));
@@ -121,8 +135,9 @@ export class Aim {
   current() {
     const { scene, view: [x, y, width, height] } = this.map;
     if (!scene.warehouse) return null;
-    // The squares' sides are meant only while goods are placed.
-    if (!this.chosen || (this.chosen.kind === "square") !== scene.isPlacing) this.chosen = nearest([x + width / 2, -y - height / 2], scene);
+    // What is set up and what is worked with are other things.
+    if (!this.chosen || this.wasPlacing !== scene.isPlacing) this.chosen = nearest([x + width / 2, -y - height / 2], scene);
+    this.wasPlacing = scene.isPlacing;
     return this.chosen;
   }
 

@@ -1,11 +1,15 @@
 // The grid of a warehouse: its sides, and the things on it that a pointer or a key can mean.
 
+import { BEYOND } from "./floor.js";
+
 /** The steps to the four sides of a square, with y upwards. */
 export const SIDES = { left: [-1, 0], up: [0, 1], right: [1, 0], down: [0, -1] };
 
 /** How near a point means a crossing or a way: as a part of a square's side, and in pixels at least. */
 const NEAR = 0.15;
 const NEAR_PX = 8;
+/** How near to it a handle or a corner of the floor is meant, in pixels: as a finger is. */
+const GRIP_PX = 22;
 /** How far from its middle the side of a square is meant by keys, as a part of the square's side. */
 const ASIDE = 0.3;
 
@@ -38,22 +42,37 @@ const crossing = (x, y, side) => ({ kind: "crossing", id: `${x},${y}`, at: [x * 
 const wayAt = (words, side) => ({ kind: "way", id: words, at: way(words, side).middle });
 const good = ({ id, x, y }) => ({ kind: "good", id, at: [x, y] });
 
+const edge = (id, at) => ({ kind: "edge", id, at });
+
+/** The corners of a floor, and the handles by which it is made larger or smaller. */
+function bounds([width, height], side) {
+  const corners = [[0, 0], [width, 0], [0, height], [width, height]].map(([x, y]) => ({ ...crossing(x, y, side), kind: "corner" }));
+  return [...corners, edge("right", [width * side + BEYOND, (height / 2) * side]), edge("up", [(width / 2) * side, height * side + BEYOND])];
+}
+
 function square(x, y, from, side) {
   const [dx, dy] = SIDES[from];
   return { kind: "square", id: `${x} ${y} ${from}`, square: [x, y], side: from, at: [(x + 0.5 + dx * ASIDE) * side, (y + 0.5 + dy * ASIDE) * side] };
 }
 
-/** What a point in mm means: goods, a crossing or a way; while goods are placed, the side of a square; or null. */
+/** The side of a square that a point in mm means; null outside. */
+export function sideAt([px, py], { warehouse: { size: [width, height] }, side }) {
+  const [gx, gy] = [px / side, py / side];
+  const [x, y] = [Math.floor(gx), Math.floor(gy)];
+  return x < 0 || y < 0 || x >= width || y >= height ? null : square(x, y, nearestSide(gx - x, gy - y), side);
+}
+
+/** What a point in mm means: goods, a crossing or a way; while it is set up, a handle, a corner or a square's side; or null. */
 export function meant([px, py], { warehouse, side, scale, parcels, isPlacing }) {
   if (!warehouse) return null;
   const [width, height] = warehouse.size;
   const [gx, gy] = [px / side, py / side];
-  if (isPlacing) {
-    const [x, y] = [Math.floor(gx), Math.floor(gy)];
-    return x < 0 || y < 0 || x >= width || y >= height ? null : square(x, y, nearestSide(gx - x, gy - y), side);
-  }
   const hit = parcels.find(({ x, y, size }) => Math.max(Math.abs(px - x), Math.abs(py - y)) <= size / 2);
   if (hit) return good(hit);
+  if (isPlacing) {
+    const grip = bounds(warehouse.size, side).find(({ at: [x, y] }) => Math.hypot(px - x, py - y) < GRIP_PX * scale);
+    return grip ?? sideAt([px, py], { warehouse, side });
+  }
   const near = Math.min(0.3, Math.max(NEAR, (NEAR_PX * scale) / side));
   const [nx, ny] = [Math.round(gx), Math.round(gy)];
   const [isColumn, isRow] = [Math.abs(gx - nx) < near, Math.abs(gy - ny) < near];
@@ -66,7 +85,8 @@ export function meant([px, py], { warehouse, side, scale, parcels, isPlacing }) 
 
 /** Everything that keys can reach. */
 function all({ warehouse: { size: [width, height] }, side, parcels, isPlacing }) {
-  const found = isPlacing ? [] : parcels.map(good);
+  const found = parcels.map(good);
+  if (isPlacing) found.push(...bounds([width, height], side));
   for (let x = 0; x <= width; x++) {
     for (let y = 0; y <= height; y++) {
       if (isPlacing) {

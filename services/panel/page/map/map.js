@@ -5,7 +5,7 @@
 import { Aim } from "./aim.js";
 import { Floor } from "./floor.js";
 import { Goods, carries } from "./goods.js";
-import { ends, way } from "./grid.js";
+import { ends, sideAt, way } from "./grid.js";
 import { Labels, meets } from "./labels.js";
 import { MM_PER_DUTY } from "../station/link.js";
 import { BODY, Robot } from "./robot.js";
@@ -20,6 +20,9 @@ const GLIDE_MS = 100;
 const MARGIN_PX = 32;
 const ABOVE_PX = 40;
 const BELOW_PX = 64;
+/** While it is set up there are buttons above it, too, and its lengths stand beside it. */
+const MARGIN_SET_UP_PX = 72;
+const ABOVE_SET_UP_PX = 140;
 /** The numbers of the columns stand below the floor. */
 const NUMBERS_PX = 16;
 /** How far in and out one can zoom: the width of the view in mm. */
@@ -33,9 +36,9 @@ const REDUCED = matchMedia("(prefers-reduced-motion: reduce)");
 const FAR = matchMedia("(min-width: 2400px)");
 
 export class WarehouseMap {
-  /** `hand` is what `Aim` takes and `isPlacing`, whether a click places goods; `tell` says something below the map. */
+  /** `hand` is what `Aim` takes and `isPlacing`, whether it is set up; `tell` says something below the map. */
   constructor(svg, { words, scaleBar, legend, tools, hand, tell }) {
-    Object.assign(this, { svg, words, scaleBar, legend, tell, isPlacing: hand.isPlacing, followButton: tools.follow });
+    Object.assign(this, { svg, words, scaleBar, legend, tell, isPlacing: hand.isPlacing, followButton: tools.follow, scaledAnew: () => {} });
     this.warehouse = null;
     this.view = [0, 0, 1000, 1000];
     this.px = 1;
@@ -93,6 +96,11 @@ export class WarehouseMap {
   /** What the hand may mean. */
   get scene() {
     return { warehouse: this.warehouse, side: this.side, scale: this.px, parcels: this.goods.parcels, isPlacing: this.isPlacing() };
+  }
+
+  /** The side of a square that a point in mm means; null outside. */
+  sideAt(point) {
+    return sideAt(point, this.scene);
   }
 
   /** Moves a robot to where it is now, or where it was last; called before each picture. */
@@ -254,10 +262,16 @@ export class WarehouseMap {
     const [left, top, right, bottom] = this.floor.bounds;
     const { width, height } = this.size;
     const grow = FAR.matches ? 1.5 : 1;
-    const [margin, above, below] = [MARGIN_PX * grow, ABOVE_PX * grow, (BELOW_PX + NUMBERS_PX) * grow];
+    const [margin, above, below] = [(this.isPlacing() ? MARGIN_SET_UP_PX : MARGIN_PX) * grow, (this.isPlacing() ? ABOVE_SET_UP_PX : ABOVE_PX) * grow, (BELOW_PX + NUMBERS_PX) * grow];
     const px = Math.max((right - left) / Math.max(1, width - 2 * margin), (top - bottom) / Math.max(1, height - above - below));
     this.view = [left - margin * px, -top - above * px, right - left + 2 * margin * px, top - bottom + (above + below) * px];
     this.follow(false);
+    this.show();
+  }
+
+  /** Draws at the same scale anew, in another language. */
+  redraw() {
+    this.scaled = null;
     this.show();
   }
 
@@ -304,6 +318,7 @@ export class WarehouseMap {
     this.px = px;
     this.svg.style.setProperty("--px", px);
     this.floor.scale(px);
+    this.scaledAnew();
     this.goods.draw(this.warehouse, this.side, px);
   }
 

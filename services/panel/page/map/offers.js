@@ -8,9 +8,9 @@ import { clock, say } from "../words/words.js";
 
 /**
  * `link` and `robot` as everywhere. `fetch` orders goods or asks whether they are back, `stands` says where the robot
- * stands, `obstacle` puts or takes one, `goods` puts goods at the side of a square; `isPlaceWanted` and `now` as named.
+ * stands, `obstacle` puts or takes one, `setUp` offers what is set up; `isPlaceWanted` and `now` as named.
  */
-export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now }) {
+export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, setUp, isSetUp, now }) {
   const of = {
     /** Goods are fetched; those that are not in their place, after a question. */
     good({ id }) {
@@ -52,8 +52,6 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
       const isThere = shown.placed.some((words) => oneName(words) === id);
       return { what, does: say(isThere ? "does_take" : "does_put"), act: () => obstacle(id) };
     },
-
-    square: ({ square, side }) => ({ what: say("tip_square", square.join(","), say(side)), does: say("does_goods"), act: () => goods(square, side) }),
   };
 
   /** Why a robot is told nothing now. */
@@ -64,5 +62,9 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
   }
 
   /** What it is, what a click does, or why a click does nothing. */
-  return (target) => (target ? of[target.kind](target) : { why: say("nothing_here") });
+  return (target) => {
+    // Nothing is ordered meanwhile.
+    if (isSetUp()) return target ? setUp(target) : { why: say("set_up_how") };
+    return target ? of[target.kind](target) : { why: say("nothing_here") };
+  };
 }

@@ -4,7 +4,8 @@
 //
 //   you <name> driver|viewer
 //   warehouse <json>
-//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
+//   kept <where>
+//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- uses=<what>|- renews=0|1 [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
 //   from <robot> asked <who> <what>   a person here wants an action, stop, take or free
 //   past <robot> <ms> <an event, a thought or what was asked so long ago>
@@ -16,6 +17,7 @@
 //   stop <robot> <number>             ahead of all else
 //   take <robot> <number>             the driver's seat, or asks whoever has it for it
 //   free | keep <robot> <number>      leaves it; does not leave it for whoever asks
+//   renew <robot> <number>            puts a simulated robot into the warehouse that is saved
 //   warehouse <number> <json>
 //   here <ms>                         once a second
 //
@@ -41,6 +43,9 @@ class Robot {
     this.name = name;
     this.connected = false;
     this.speaks = false;
+    /** Which warehouse it uses, and whether it can be put into the saved one. */
+    this.uses = "-";
+    this.renews = false;
     this.driver = null;
     /** Who asks the driver for the wheel. */
     this.asks = null;
@@ -106,6 +111,8 @@ export class Link extends EventTarget {
     super();
     this.robots = new Map();
     this.warehouse = null;
+    /** Where the station keeps it. */
+    this.kept = null;
     this.me = null;
     this.mayDrive = false;
     this.open = false;
@@ -214,6 +221,8 @@ export class Link extends EventTarget {
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
+    } else if (word === "kept") {
+      this.kept = line.slice("kept ".length);
     } else if (word === "you") {
       // All that has happened is told after this.
       for (const robot of this.robots.values()) robot.forget();
@@ -239,6 +248,7 @@ export class Link extends EventTarget {
     robot.speaks = said.speaks === "1";
     robot.driver = said.driver === "-" ? null : said.driver;
     robot.asks = said.asks ?? null;
+    [robot.uses, robot.renews] = [said.uses, said.renews === "1"];
     // One that speaks only the document's language shows nothing that could be old.
     robot.heard = said.age_ms === undefined ? -Infinity : performance.now() - Number(said.age_ms);
   }
