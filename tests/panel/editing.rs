@@ -294,7 +294,7 @@ fn a_simulated_robot_is_put_into_the_saved_warehouse_after_a_question_and_stands
     });
     wait_for("its place", || {
         let status = status.latest().expect("readable")?;
-        let is_there = (status.node.x, status.node.y) == (0, 4);
+        let is_there = (status.x, status.y) == (0, 4);
         (is_there && status.phase == Phase::WaitingForOrder).then_some(())
     });
     wait_for("what is dropped to be told", || {

@@ -1,7 +1,7 @@
 // The hand on the map. A pointer, a finger or the keys pan and zoom it, and mean a thing on it: the tip says what that
 // is and what a click or Enter does there. The same words stand for all of them (offers.js), so no tip is wrong.
 
-import { meant, nearest, nextTo } from "./grid.js";
+import { again, meant, nearest, nextTo } from "./grid.js";
 import { meets } from "./labels.js";
 import { put, say } from "../words/words.js";
 
@@ -137,6 +137,8 @@ export class Aim {
     if (!scene.warehouse) return null;
     // What is set up and what is worked with are other things.
     if (!this.chosen || this.wasPlacing !== scene.isPlacing) this.chosen = nearest([x + width / 2, -y - height / 2], scene);
+    else if (this.isOld) this.chosen = again(this.chosen, scene);
+    this.isOld = false;
     this.wasPlacing = scene.isPlacing;
     return this.chosen;
   }
@@ -150,9 +152,10 @@ export class Aim {
     this.draw();
   }
 
-  /** Another warehouse has other things. */
+  /** Another warehouse has other things, or the same ones elsewhere. */
   forget() {
-    this.pointed = this.chosen = null;
+    this.pointed = null;
+    this.isOld = true;
   }
 
   /** The tip at what is meant: by the pointer or, while the map has the keys' focus, by them. */

@@ -101,15 +101,24 @@ function all({ warehouse: { size: [width, height] }, side, parcels, isPlacing })
   return found;
 }
 
-/** The thing that is next from a point in mm in a direction; what lies aside counts as further. Null if there is none. */
+/**
+ * The thing that is next from a point in mm in a direction; what lies aside counts as further, and what lies more aside
+ * than ahead only where nothing else is. Null if there is none.
+ */
 export function nextTo([px, py], [dx, dy], scene) {
-  let best = { target: null, far: Infinity };
+  let best = { target: null, isAside: true, far: Infinity };
   for (const target of all(scene)) {
     const [x, y] = [target.at[0] - px, target.at[1] - py];
     const [along, across] = [x * dx + y * dy, Math.abs(x * dy - y * dx)];
-    if (along > 1 && across <= along && along + 2 * across < best.far) best = { target, far: along + 2 * across };
+    const [isAside, far] = [across > along, along + 2 * across];
+    if (along > 1 && (isAside === best.isAside ? far < best.far : best.isAside)) best = { target, isAside, far };
   }
   return best.target;
+}
+
+/** The same thing where it is now; if it is gone, what is nearest to where it was. */
+export function again({ kind, id, at }, scene) {
+  return all(scene).find((one) => one.kind === kind && one.id === id) ?? nearest(at, scene);
 }
 
 /** The thing that is nearest to a point in mm. */

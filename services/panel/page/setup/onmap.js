@@ -68,7 +68,8 @@ export class OnMap {
       },
       edge: ({ id }) => {
         const [x, y] = edits.now.size;
-        return { what: say(`tip_edge_${id}`), does: say(`does_edge_${id}`), act: () => this.change(resized(edits.now, id === "right" ? [x + 1, y] : [x, y + 1])) };
+        const [what, does] = { right: ["tip_edge_right", "does_edge_right"], up: ["tip_edge_up", "does_edge_up"] }[id];
+        return { what: say(what), does: say(does), act: () => this.change(resized(edits.now, id === "right" ? [x + 1, y] : [x, y + 1])) };
       },
     }[target.kind](target);
     return this.mayEdit() ? offer : { what: offer.what, why: say("viewer") };
