@@ -103,7 +103,7 @@ function all({ warehouse: { size: [width, height] }, side, parcels, isPlacing })
 
 /**
  * The thing that is next from a point in mm in a direction; what lies aside counts as further, and what lies more aside
- * than ahead only where nothing else is. Null if there is none.
+ * than ahead only while it is set up, where nothing else is. Null if there is none.
  */
 export function nextTo([px, py], [dx, dy], scene) {
   let best = { target: null, isAside: true, far: Infinity };
@@ -111,7 +111,7 @@ export function nextTo([px, py], [dx, dy], scene) {
     const [x, y] = [target.at[0] - px, target.at[1] - py];
     const [along, across] = [x * dx + y * dy, Math.abs(x * dy - y * dx)];
     const [isAside, far] = [across > along, along + 2 * across];
-    if (along > 1 && (isAside === best.isAside ? far < best.far : best.isAside)) best = { target, isAside, far };
+    if (along > 1 && (scene.isPlacing || !isAside) && (isAside === best.isAside ? far < best.far : best.isAside)) best = { target, isAside, far };
   }
   return best.target;
 }
