@@ -181,8 +181,9 @@ fn renewal(
     let (config, state) = (config.clone(), state.clone());
     Some(Box::new(move || {
         let mut config = station::saved(&config)?;
-        let products = config.warehouse()?.products;
         let warehouse = run_in_copy(&mut config, &state)?;
+        // The copy's, whatever somebody saves at this moment.
+        let products = config.warehouse()?.products;
         Ok(World {
             config: toml::to_string(&config)?,
             warehouse: warehouse.context("no warehouse is saved")?,

@@ -38,7 +38,7 @@ const bar = new Bar(link, {
   { button: at("drive-resume"), said: at("drive-resume-said") },
 ]);
 const map = new WarehouseMap(at("map"), {
-  words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words) => put(at("map-said"), words),
+  words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words = "") => put(at("map-said"), words),
   tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
   hand: {
     tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: isSetUp, grip: (target) => (isSetUp() ? onMap.grip(target) : null),

@@ -26,7 +26,7 @@
 //!                                   asks for a name by the socket's address (`/live?name=Anna`)
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
 //! kept <path>                       where the station keeps it
-//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- uses=<what> renews=0|1 [asks=<name>]
+//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] uses=<what> renews=0|1
 //!       [age_ms=<int>]              which warehouse it uses: `this`, `told` or `driven` (other goods),
 //!                                   `floor_before`, `world_before` (simulated), or `-`: not known
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>

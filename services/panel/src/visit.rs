@@ -396,12 +396,13 @@ impl Visit {
         let age = shown.state.as_ref().map(|state| state.age(view.now));
         let _ = write!(
             self.lines,
-            "about {name} connected={connected} speaks={speaks} driver={driver} uses={uses} renews={renews}"
+            "about {name} connected={connected} speaks={speaks} driver={driver}"
         );
         let asks = self.handover().who(name).map(str::to_owned);
         if let Some(who) = asks {
             let _ = write!(self.lines, " asks={who}");
         }
+        let _ = write!(self.lines, " uses={uses} renews={renews}");
         if let Some(age) = age {
             let _ = write!(self.lines, " age_ms={}", age.as_millis());
         }

@@ -163,6 +163,7 @@ impl Course {
             return match event {
                 Event::Restored => self.begin(now),
                 Event::Damaged(why) => self.begin_again(&why, now),
+                Event::Renewed => self.renew(now),
                 _ => Vec::new(),
             };
         }

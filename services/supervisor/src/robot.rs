@@ -16,8 +16,6 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use lager_home::{ChanceClock, LockError};
 use lager_ports::BusConfig;
-use lager_stop::StopWord;
-use lager_topics::{Role, StopCause};
 
 use crate::children::{Children, PATIENCE, Start};
 use crate::console;
@@ -207,6 +205,10 @@ impl Robot {
 
     /// Takes what has come, and does what must be done now.
     fn turn(&mut self) -> Result<()> {
+        // While it rests, too: a request that stays unread would never let it sleep.
+        if self.signals.renewal_asked() {
+            self.renew()?;
+        }
         let due = self.course.look(self.now());
         self.carry_out(due)?;
         if self.course.rests() {
@@ -224,24 +226,16 @@ impl Robot {
         for service in self.children.due() {
             self.happened(Event::Due(service))?;
         }
-        if self.signals.renewal_asked() {
-            self.renew()?;
-        }
         Ok(())
     }
 
-    /// Puts a simulated robot on the delivery node of the warehouse that its station has saved. It
-    /// stands there until a person releases the stop.
+    /// Stops the robot and, if it is simulated, puts it on the delivery node of the warehouse that
+    /// its station has saved. Either way it stands until a person releases this stop: one who has
+    /// released an earlier stop did not know of the new world.
     fn renew(&mut self) -> Result<()> {
-        let Some(renewal) = &self.plan.renewal else {
-            return Ok(());
-        };
-        let stop = self.lock.stop_word();
-        let world = renewal().and_then(|world| {
-            if !StopWord::read(&stop)?.is_some_and(|told| told.stop().is_some()) {
-                StopWord::set(&stop, Role::Supervisor, StopCause::Ordered)?;
-            }
-            Ok(world)
+        let world = self.lock.stop().and_then(|()| match &self.plan.renewal {
+            Some(renewal) => renewal(),
+            None => bail!("only a simulated robot with its own station can leave it, and none that ends with its mission"),
         });
         let world = match world {
             Ok(world) => world,
@@ -305,7 +299,9 @@ impl Robot {
         let restored = self
             .lock
             .restore(bus, config, eeprom.as_deref())
-            .and_then(|()| warehouse.as_ref().map(WarehouseCopy::write).transpose());
+            .and_then(|()| warehouse.as_ref().map(WarehouseCopy::write).transpose())
+            // Somebody may have released the stop before the last service ended.
+            .and_then(|_| self.products.as_ref().map(|_| self.lock.hold()).transpose());
         if let Err(error) = restored {
             if matches!(error.downcast_ref(), Some(LockError::Up { .. })) {
                 return Err(error);

@@ -13,6 +13,7 @@ use lager_home::{Home, Life, Lock, UnitName};
 use lager_lines::secret::Secret;
 use lager_ports::BusConfig;
 use lager_stop::{StopPage, StopWord};
+use lager_topics::{Role, StopCause};
 
 use crate::service::Service;
 
@@ -186,9 +187,30 @@ impl NameLock {
         self.lock.as_ref().is_some_and(Lock::is_in_place)
     }
 
-    /// The file of the robot's stop word.
-    pub fn stop_word(&self) -> PathBuf {
-        self.folder.join(StopPage::FILE)
+    /// Stops the robot, and replaces a stop that is set: who releases the earlier one does not
+    /// know of this one.
+    ///
+    /// # Errors
+    /// The word cannot be written.
+    pub fn stop(&self) -> Result<()> {
+        StopWord::set(
+            &self.folder.join(StopPage::FILE),
+            Role::Supervisor,
+            StopCause::Ordered,
+        )?;
+        Ok(())
+    }
+
+    /// Stops the robot unless a stop is set.
+    ///
+    /// # Errors
+    /// The word cannot be read or written.
+    pub fn hold(&self) -> Result<()> {
+        let told = StopWord::read(&self.folder.join(StopPage::FILE))?;
+        match told.and_then(|told| told.stop()) {
+            Some(_) => Ok(()),
+            None => self.stop(),
+        }
     }
 
     /// Makes sure that others find this robot by its lock.

@@ -41,7 +41,7 @@ export class OnMap {
 
   change(warehouse) {
     this.carried = null;
-    this.map.tell("");
+    this.map.tell();
     if (this.edits.change(warehouse)) this.changed();
   }
 

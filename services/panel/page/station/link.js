@@ -5,7 +5,7 @@
 //   you <name> driver|viewer
 //   warehouse <json>
 //   kept <where>
-//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- uses=<what>|- renews=0|1 [asks=<name>] [age_ms=<n>]
+//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] uses=<what>|- renews=0|1 [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
 //   from <robot> asked <who> <what>   a person here wants an action, stop, take or free
 //   past <robot> <ms> <an event, a thought or what was asked so long ago>
