@@ -46,7 +46,9 @@ export class Kept {
     if (robot?.name !== this.name) this.name = null;
     parts.box.hidden = this.name === null;
     if (this.name === null) return;
-    const unfit = robot.queue.map(({ product }) => product).filter((product) => !link.warehouse.product?.some(({ id }) => String(id) === product));
+    // The order under way need not be listed with those that wait.
+    const ordered = new Set([robot.state.product, ...robot.queue.map(({ product }) => product)]);
+    const unfit = [...ordered].filter((product) => product && !link.warehouse.product?.some(({ id }) => String(id) === product));
     put(parts.question, [say("renew_how", robot.name), unfit.length ? say("renew_drops", unfit.join(", ")) : ""].filter(Boolean).join(" "));
   }
 }
