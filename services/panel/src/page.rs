@@ -121,7 +121,7 @@ pub(crate) fn file(path: &str, robot: &str) -> Option<(&'static str, String)> {
 /// A file as it is sent to who takes it packed: in zlib's form, which HTTP calls `deflate`.
 pub(crate) fn packed(path: &str, content: &str) -> Vec<u8> {
     static PACKED: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
-    let pack = || compress_to_vec_zlib(content.as_bytes(), 6);
+    let pack = || compress_to_vec_zlib(content.as_bytes(), 9);
     // A page has the name of its robot in it.
     if ["/", "/screen"].contains(&path) {
         return pack();
@@ -184,6 +184,15 @@ mod tests {
                     .trim_start_matches("async ");
                 let mut kinds = ["const ", "function ", "class "].iter();
                 assert!(kinds.any(|kind| rest.starts_with(kind)), "{name}: {line}");
+            }
+            // The script has no indentation, so no text may go on in a further line.
+            let code = content.lines().map(str::trim_start).filter(|line| {
+                !["//", "/**", "*"]
+                    .iter()
+                    .any(|begin| line.starts_with(begin))
+            });
+            for line in code.filter(|_| !name.starts_with("vendor/")) {
+                assert!(line.matches('`').count() % 2 == 0, "{name}: {line}");
             }
         }
         // Each module is in one of the page's scripts, but for the other page's and the first script.
