@@ -132,22 +132,23 @@ export class OnMap {
    * @returns {Grip | null}
    */
   grip(target) {
-    const { now } = this.edits;
-    if (!now || !this.mayEdit()) return null;
-    if (target?.kind === "edge") return this.stretch(target.id, now);
-    return target?.kind === "good" ? this.carry(Number(target.id), now) : null;
+    if (!this.mayEdit()) return null;
+    if (target?.kind === "edge") return this.stretch(target.id);
+    return target?.kind === "good" ? this.carry(Number(target.id)) : null;
   }
 
   /**
    * @param {string} edge
-   * @param {Warehouse} now
    * @returns {Grip}
    */
-  stretch(edge, now) {
-    const { map, ghost, size } = this;
-    let wanted = now;
+  stretch(edge) {
+    const { edits, map, ghost, size } = this;
+    /** @type {Warehouse | null} */
+    let wanted = null;
     return {
       move: ([x, y]) => {
+        const { now } = edits;
+        if (!now) return;
         const { side } = map;
         const [columns, rows] = now.size;
         wanted = resized(now, edge === "right" ? [Math.round((x - BEYOND) / side), rows] : [columns, Math.round((y - BEYOND) / side)]);
@@ -156,18 +157,17 @@ export class OnMap {
         put(size, wanted.size.join(" × "));
         write(size, [x, -y - 16 * map.px]);
       },
-      end: () => this.change(wanted),
+      end: () => edits.now && wanted && this.change(resized(edits.now, wanted.size)),
       cancel: () => [ghost, size].forEach(hide),
     };
   }
 
   /**
    * @param {number} id
-   * @param {Warehouse} now
    * @returns {Grip}
    */
-  carry(id, now) {
-    const { map, spot } = this;
+  carry(id) {
+    const { edits, map, spot } = this;
     /** @type {SquareSide | null} */
     let place = null;
     return {
@@ -176,7 +176,7 @@ export class OnMap {
         if (place) box(spot, mark(place, map.side));
         else hide(spot);
       },
-      end: () => place && this.change(moved(now, id, place.square, place.side)),
+      end: () => edits.now && place && this.change(moved(edits.now, id, place.square, place.side)),
       cancel: () => hide(spot),
     };
   }
