@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use lager_orders::Mode;
 use lager_ports::Subscriber;
 use lager_stop::{Stop, StopWord};
 use lager_tests::{Domain, Running, wait_for};
@@ -73,6 +74,12 @@ fn a_robot_that_gets_another_world_stands_whatever_happens_meanwhile() {
     let mut status: Subscriber<NavStatus> = observer.subscriber().expect("a topic");
     let said = wait_for("the bridge", || health.latest().expect("readable"));
     assert_eq!(said.stopped, 1, "{said:?}");
+    // Once a person releases the stop, it takes orders as at its first start.
+    wait_for("the mode", || {
+        let said = health.latest().expect("readable")?;
+        assert_eq!(said.stopped, 1);
+        (said.mode == Mode::Autonomous).then_some(())
+    });
     wait_for("its place", || {
         let status = status.latest().expect("readable")?;
         ((status.x, status.y) == (2, 0)).then_some(())

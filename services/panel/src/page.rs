@@ -46,14 +46,20 @@ static BUNDLES: LazyLock<[(&str, Bundle); 3]> = LazyLock::new(|| {
 const SIGNALS: &str = "signals/signals.js";
 
 /// How the page looks: the parts of each folder, and then what holds for all of it, the rules for
-/// small and for large screens included.
+/// small and for large screens included. Comments are left out.
 static LOOK: LazyLock<String> = LazyLock::new(|| {
     let (of_all, of_parts): (Vec<_>, Vec<_>) = FILES
         .iter()
         .filter(|(name, _)| name.ends_with(".css"))
         .partition(|(name, _)| !name.contains('/'));
     let sheets = of_parts.iter().chain(&of_all);
-    sheets.map(|(_, content)| *content).collect()
+    let all: String = sheets.map(|(_, content)| *content).collect();
+    let parts = all.split("/*").enumerate();
+    let rules = parts.map(|(index, part)| match index {
+        0 => part,
+        _ => part.split_once("*/").map_or(part, |(_, rules)| rules),
+    });
+    rules.collect()
 });
 
 /// The table of sentences, and the limits of a floor, as a script of its own: what stands in it, the
@@ -148,6 +154,7 @@ mod tests {
             .map(|path| file(path, "r1").unwrap().1.len())
             .sum();
         assert!(bytes < 350_000, "{bytes}");
+        assert!(LOOK.contains("#setup-bar") && !LOOK.contains("*/"));
     }
 
     /// How many bytes of these go over the network.

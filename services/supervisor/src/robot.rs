@@ -249,8 +249,6 @@ impl Robot {
         self.plan.config = world.config;
         self.plan.warehouse = Some(world.warehouse);
         self.products = Some(world.products);
-        let before = "the robot was put into another warehouse in the middle of it";
-        self.plan.mission.give_up(before);
         self.happened(Event::Renewed)
     }
 
@@ -294,6 +292,7 @@ impl Robot {
             eeprom,
             warehouse,
             keeping,
+            mission,
             ..
         } = &mut self.plan;
         let restored = self
@@ -311,6 +310,9 @@ impl Robot {
         // Nobody knows the robot's orders any more, and a simulated world is a new one.
         keeping.begin_again();
         let products = self.products.take();
+        if products.is_some() {
+            mission.leave_world("the robot was put into another warehouse in the middle of it");
+        }
         let dropped = products.map(|products| keeping.keep_only(&products));
         for product in dropped.unwrap_or_default() {
             self.note(&format!(

@@ -68,7 +68,7 @@ export class Rows {
     const why = document.createElement("p");
     Object.assign(why, { className: "wrong", hidden: true });
     const fields = { id: field("id", id), name: field("name", name), x: field("x", x), y: field("y", y) };
-    for (const parts of [[fields.id], [fields.name, why], [fields.x, fields.y], [from], [remove]]) {
+    for (const parts of [[fields.id, why], [fields.name], [fields.x, fields.y], [from], [remove]]) {
       const cell = document.createElement("td");
       cell.append(...parts);
       line.append(cell);
