@@ -264,7 +264,7 @@ impl Page {
 
     /// A place once it has not moved for a moment, or after 2 s: what has just been shown moves what
     /// stands below it.
-    fn settled(&mut self, place: impl Fn(&mut Self) -> (f64, f64)) -> (f64, f64) {
+    pub(crate) fn settled(&mut self, place: impl Fn(&mut Self) -> (f64, f64)) -> (f64, f64) {
         let mut at = place(self);
         for _ in 0..40 {
             std::thread::sleep(Duration::from_millis(50));
@@ -292,7 +292,7 @@ impl Page {
     }
 
     /// The pixels of a point of the floor.
-    fn place_of_mm(&mut self, right: f64, up: f64) -> (f64, f64) {
+    pub(crate) fn place_of_mm(&mut self, right: f64, up: f64) -> (f64, f64) {
         let at = self.value(&format!(
             "(() => {{ const map = document.querySelector('#map'); \
              const at = new DOMPoint({right}, -{up}).matrixTransform(map.getScreenCTM()); \

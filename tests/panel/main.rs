@@ -3,6 +3,7 @@
 
 mod browser;
 mod driving;
+mod editing;
 mod fleet;
 mod health;
 mod manners;

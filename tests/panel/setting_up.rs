@@ -38,13 +38,13 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     });
     assert_eq!(before["size"], json!([2, 2]));
 
-    // Size, corner and side by the form; the map shows them when they are saved.
+    // Size, corner and side by the form; the map shows what would be saved.
     page.fill("#warehouse [name=width]", "4");
     page.fill("#warehouse [name=height]", "5");
     page.fill("#warehouse [name=side]", "60");
     page.fill("#warehouse [name=delivery]", "4,5");
-    page.click("#warehouse [type=submit]");
-    page.wait_for("#setup-said", "saved");
+    page.click("#save");
+    page.wait_for("#setup-said", "saved in");
     page.wait_for("#map-text", "A warehouse of 4 by 5 squares");
     // Five columns and six rows of tape, each ten mm longer than the warehouse at both ends, the way
     // out and its bar.
@@ -395,11 +395,15 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     // In the set-up view, a click in a square places goods at the square's nearest side.
     page.click("#tab-setup");
     page.click_at_mm(250.0, 420.0);
-    page.wait_until(&format!("{goods} === '1,2,3,4'"));
     let placed = "(() => { const line = [...document.querySelectorAll('#products tr')].at(-1); \
                   return [...line.querySelectorAll('input, select')].map(({ value }) => value).join(); })()";
     page.wait_until(&format!("{placed} === '4,,0,0,up'"));
+    // It counts once it is saved.
+    assert_eq!(page.value(goods), "1,2,3");
+    page.click("#save");
+    page.wait_until(&format!("{goods} === '1,2,3,4'"));
     page.click("#undo");
+    page.click("#save");
     page.wait_until(&format!("{goods} === '1,2,3'"));
 
     // The page shows why an entry is impossible beside it, and changes nothing.
@@ -416,7 +420,7 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     page.wait_for("#setup-said", "goods 12 stand outside");
     page.fill("#products [name=x]", "1");
     page.fill("#products [name=name]", "nails");
-    page.click("#warehouse [type=submit]");
+    page.click("#save");
     page.wait_until(&format!("{goods} === '1,2,3,12'"));
     page.wait_until(
         "document.querySelector('#map [data-product=\"12\"] title').textContent === '12 nails'",
@@ -442,7 +446,7 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     ] {
         let field = format!("#warehouse [name={field}]");
         page.fill(&field, value);
-        page.click("#warehouse [type=submit]");
+        page.click("#save");
         page.wait_for("#setup-said", why);
         page.fill(&field, right);
     }

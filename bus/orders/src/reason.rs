@@ -66,6 +66,8 @@ codes! {
     UsesDriven = "uses_driven",
     UsesFloorBefore = "uses_floor_before",
     UsesWorldBefore = "uses_world_before",
+    FloorUnfit = "floor_unfit",
+    FloorElsewhere = "floor_elsewhere",
     Ordered = "ordered",
     Gone = "gone",
     ProductsFull = "products_full",

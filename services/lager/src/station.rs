@@ -13,19 +13,21 @@ use lager_comm::secrets_at;
 use lager_home::LONGEST_SOCKET;
 use lager_lines::Name;
 use lager_lines::secret::Secrets;
-use lager_panel::{Panel, Tokens};
+use lager_orders::{Code, Reason};
+use lager_panel::{Panel, Tokens, World};
 use lager_plant::Warehouse;
 use lager_station::files::Hold;
 use lager_station::{History, Listen, Queues, Server, ServerConfig};
-use lager_supervisor::Service;
 use lager_supervisor::children::adopt;
 use lager_supervisor::console;
 use lager_supervisor::runtime_folder::{GAG, RuntimeFolder};
 use lager_supervisor::state_folder::StateFolder;
+use lager_supervisor::{Parent, Service};
 use lager_wake::Shutdown;
+use rustix::process::{Signal, getppid, kill_process};
 
 use crate::cli::StationArgs;
-use crate::config::{Config, StationSection};
+use crate::config::{Body, Config, StationSection};
 use crate::goods;
 use crate::reach;
 
@@ -46,8 +48,11 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
             let panel = config.station.panel.and_then(|address| {
                 // The station serves robots, whoever looks at the panel.
                 let panel = tokens(config).and_then(|tokens| {
-                    let panel = Panel::open(address, tokens, server.handle());
-                    Ok(panel?)
+                    let panel = Panel::open(address, tokens, server.handle())?;
+                    Ok(match config.body {
+                        Body::Serial => panel,
+                        Body::Sim | Body::Chip => panel.with_world(world(config, parent)?),
+                    })
                 });
                 panel.inspect_err(|error| tracing::warn!("{error:#}")).ok()
             });
@@ -68,6 +73,38 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
     }
     server.run(&shutdown.flag())?;
     Ok(())
+}
+
+/// The configuration with the warehouse that the station has saved, if a world can be made of it.
+///
+/// # Errors
+/// There is none.
+pub fn saved(config: &Config) -> Result<Config> {
+    let file = config.station.warehouse.as_ref();
+    let file = file.context("the station keeps no warehouse")?;
+    let config = Config {
+        warehouse: file.display().to_string(),
+        ..config.clone()
+    };
+    config.warehouse()?;
+    Ok(config)
+}
+
+/// The simulated world of the robot that `up`, the parent, runs beside this station.
+fn world(config: &Config, parent: Parent) -> Result<World> {
+    let robot = Name::new(config.name.clone())?;
+    let config = config.clone();
+    let renew = move || -> Result<()> {
+        saved(&config)?;
+        let supervisor =
+            getppid().filter(|pid| pid.as_raw_nonzero().get().cast_unsigned() == parent.pid);
+        let supervisor = supervisor.context("the program that has started the robot has ended")?;
+        kill_process(supervisor, Signal::USR1)?;
+        Ok(())
+    };
+    Ok(World::new(robot, move || {
+        renew().map_err(|error| Reason::new(Code::FloorUnfit, &[&format!("{error:#}")]))
+    }))
 }
 
 /// Started by a person.

@@ -6,7 +6,7 @@ mod external;
 
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use lager_floor::ProductId;
 use lager_home::Clock;
 use lager_lines::Called;
@@ -18,7 +18,7 @@ use lager_supervisor::mission::Mission;
 use lager_supervisor::runtime_folder::RuntimeFolder;
 use lager_supervisor::signals::Signals;
 use lager_supervisor::state_folder::{self, StateFolder, WarehouseCopy};
-use lager_supervisor::{Plan, Robot, Service, Terminal};
+use lager_supervisor::{Plan, Robot, Service, Terminal, World};
 use lager_topics::Role;
 
 use crate::cli::UpArgs;
@@ -90,6 +90,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     ];
     let told = [first_line(&config, args)?, external.told].into_iter();
     let told = told.chain(external.panel).chain(external.gateway);
+    let renewal = renewal(&config, &state, args, external.listener.is_some());
     let plan = Plan {
         config: text,
         bus: config.bus()?,
@@ -101,6 +102,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         listener: external.listener,
         eeprom: config.chip.eeprom,
         warehouse,
+        renewal,
         mission,
         keeping: match args.exit_when_done {
             true => Keeping::default(),
@@ -163,6 +165,31 @@ fn run_in_copy(config: &mut Config, state: &StateFolder) -> Result<Option<Wareho
     };
     config.warehouse = copy.write()?.display().to_string();
     Ok(Some(copy))
+}
+
+/// Makes the world of the warehouse that the robot's own station has saved, for a simulated robot.
+/// One that ends with its mission stays in its world.
+fn renewal(
+    config: &Config,
+    state: &StateFolder,
+    args: &UpArgs,
+    has_station: bool,
+) -> Option<Box<dyn Fn() -> Result<World>>> {
+    if config.body == Body::Serial || args.exit_when_done || !has_station {
+        return None;
+    }
+    let (config, state) = (config.clone(), state.clone());
+    Some(Box::new(move || {
+        let mut config = station::saved(&config)?;
+        let warehouse = run_in_copy(&mut config, &state)?;
+        // The copy's, whatever somebody saves at this moment.
+        let products = config.warehouse()?.products;
+        Ok(World {
+            config: toml::to_string(&config)?,
+            warehouse: warehouse.context("no warehouse is saved")?,
+            products: products.iter().map(|product| product.id).collect(),
+        })
+    }))
 }
 
 /// Chooses the warehouse, and where its changes are kept. Returns what people should know of it.

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { carries, turnOf } from "../page/map/goods.js";
-import { ends, meant, nearest, nextTo, oneName, way } from "../page/map/grid.js";
+import { again, ends, meant, nearest, nextTo, oneName, way } from "../page/map/grid.js";
 import { free, meets } from "../page/map/labels.js";
 import { offers } from "../page/map/offers.js";
 import { blockedFor, nextOf } from "../page/map/ways.js";
@@ -38,10 +38,13 @@ test("a point means the goods, the crossing or the way that is there, and off th
   assert.equal(at([480, 400], { scale: 20, parcels: [] }).kind, "crossing");
 });
 
-test("while goods are placed a point means the side of its square that is nearest", () => {
+test("while the warehouse is set up a point means goods, a corner, an edge, or the side of its square that is nearest", () => {
   const at = (point) => meant(point, scene({ isPlacing: true }));
+  assert.deepEqual(at([620, 110]), { kind: "good", id: "7", at: [600, 150] });
+  assert.deepEqual(at([1_195, 810]), { kind: "corner", id: "3,2", at: [1_200, 800] });
+  assert.deepEqual([at([1_330, 400]), at([600, 930])].map(({ kind, id }) => [kind, id]), [["edge", "right"], ["edge", "up"]]);
   assert.deepEqual([at([420, 200]), at([600, 390])].map(({ square, side }) => [square, side]), [[[1, 0], "left"], [[1, 0], "up"]]);
-  assert.equal(at([1_200, 0]), null);
+  assert.equal(at([1_240, 100]), null);
 });
 
 test("keys reach everything, one step at a time", () => {
@@ -58,6 +61,27 @@ test("keys reach everything, one step at a time", () => {
   assert.equal(nextTo([0, 0], [0, -1], scene()), null);
   assert.equal(nearest([590, 160], scene()).kind, "good");
   assert.equal(nearest([0, 0], scene({ warehouse: null })), null);
+});
+
+test("while the warehouse is set up keys reach each thing, also what lies more aside than ahead", () => {
+  const set = scene({ isPlacing: true });
+  const arrows = [[1, 0], [-1, 0], [0, 1], [0, -1]];
+  const [first, reached] = [nearest([0, 0], set), new Map()];
+  const reach = (target) => {
+    if (!target || reached.has(`${target.kind} ${target.id}`)) return;
+    reached.set(`${target.kind} ${target.id}`, target);
+    for (const arrow of arrows) reach(nextTo(target.at, arrow, set));
+  };
+  reach(first);
+  const kinds = [...reached.values()].map(({ kind }) => kind);
+  const count = (kind) => kinds.filter((one) => one === kind).length;
+  assert.deepEqual(["good", "corner", "edge", "square"].map(count), [1, 4, 2, 6 * 4]);
+});
+
+test("what the keys mean stays the same thing when it is elsewhere", () => {
+  const good = { kind: "good", id: "7", at: [600, 150] };
+  assert.deepEqual(again(good, scene({ isPlacing: true, parcels: [{ ...PARCEL, x: 1_000 }] })).at, [1_000, 150]);
+  assert.equal(again(good, scene({ isPlacing: true, parcels: [] })).id, "1 0 down");
 });
 
 test("a label stands at its thing, off what it may not cover, and in the view while there is room", () => {
@@ -125,7 +149,7 @@ function offered(one, more = {}) {
   const act = (name) => (...what) => done.push([name, ...what]);
   const page = {
     link: { warehouse: WAREHOUSE, mayDrive: true }, robot: () => one, now: () => NOW, isPast: () => false, isPlaceWanted: () => false,
-    fetch: act("fetch"), stands: act("stands"), obstacle: act("obstacle"), goods: act("goods"), ...more,
+    fetch: act("fetch"), stands: act("stands"), obstacle: act("obstacle"), isSetUp: () => false, setUp: () => assert.fail("nothing is set up"), ...more,
   };
   return { offer: offers(page), done };
 }
@@ -169,6 +193,13 @@ test("an obstacle is put only in a simulated world", () => {
   assert.equal(offered(robot({}, { truth })).offer(edge).does, "put an obstacle here");
   assert.equal(offered(robot({}, { truth, placed: ["1 1 down"] })).offer(edge).does, "take the obstacle away");
   assert.match(offered(robot({ time_ms: "9000" }, { truth, blocked: new Map([["1 1 down", 4]]) })).offer(edge).what, /found blocked 5 s ago/);
+});
+
+test("while the warehouse is set up nothing is ordered", () => {
+  const { offer, done } = offered(robot({}), { isSetUp: () => true, setUp: ({ id }) => ({ what: `set up ${id}` }) });
+  assert.deepEqual(offer(GOOD), { what: "set up 7" });
+  assert.match(offer(null).why, /^Click on a side/);
+  assert.deepEqual(done, []);
 });
 
 test("where there is nothing, that is said", () => {

@@ -24,11 +24,14 @@ import { Moment } from "./time/moment.js";
 import { Notify } from "./bar/notify.js";
 import { obstacles } from "./map/obstacle.js";
 import { offers } from "./map/offers.js";
+import { OnMap } from "./setup/onmap.js";
 import { drawRemedy } from "./bar/remedy.js";
+import { Rename } from "./setup/rename.js";
 import { Save } from "./log/save.js";
 import { Setup } from "./setup/setup.js";
 import { Strips } from "./signals/strips.js";
 import { TimeLine } from "./time/line.js";
+import { Uses } from "./setup/uses.js";
 import { Wheel } from "./drive/wheel.js";
 import { change, current, put, say, translate } from "./words/words.js";
 
@@ -53,20 +56,20 @@ const meetWay = obstacles(link, { said: at("map-said"), undo: at("map-undo") }, 
 /**
  * What goods, crossings and ways are, and what a click on one does.
  *
- * @param {{ robot: () => Robot | null, isPast: () => boolean }} of the robot that is shown
+ * @param {{ robot: () => Robot | null, isPast: () => boolean, isSetUp: () => boolean }} of the robot that is shown
  */
 const offered = (of) => offers({
   link, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
   fetch: (product, hand = { beside: at("map-undo"), said: at("map-said") }) => missions.fetch(product, hand),
-  goods: (square, side) => setup.place(square, side),
+  setUp: (target) => rename.offers(target),
   ...of,
 });
 const map = new WarehouseMap(at("map"), {
-  words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words) => put(at("map-said"), words),
+  words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words = "") => put(at("map-said"), words),
   tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
   hand: {
-    tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: () => !at("setup").hidden,
-    offers: offered({ isPast: () => moment.isPast, robot: () => moment.shown(robot(), now())[0] }),
+    tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: isSetUp, grip: (target) => (isSetUp() ? onMap.grip(target) : null),
+    offers: offered({ isPast: () => moment.isPast, isSetUp, robot: () => moment.shown(robot(), now())[0] }),
   },
 });
 const missions = new Missions(link, {
@@ -75,7 +78,7 @@ const missions = new Missions(link, {
   said: at("missions-said"), head: at("queue-said"), queue: at("queue"), rest: at("missions-now"),
   order: at("order"), orderNumber: at("order-number"), orderName: at("order-name"), orderWhere: at("order-where"), orderTime: at("order-time"), orderSteps: at("order-steps"), orderCancel: at("order-cancel"),
   past: at("past"), pastOpen: at("past-open"), pastGoods: at("past-goods"), pastTime: at("past-time"), pastTotals: at("past-totals"), history: at("history"),
-}, robot, { offers: offered({ isPast: () => false, robot }), isArmed: () => at("armed").checked, isOpen: () => !at("missions").hidden });
+}, robot, { offers: offered({ isPast: () => false, isSetUp: () => false, robot }), isArmed: () => at("armed").checked, isOpen: () => !at("missions").hidden });
 const arm = new Arm(at("arm-drawing"));
 const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), sticks: at("sticks"), resume: at("drive-resume") }, robot, now);
 const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("hand-said"), take: at("hand-now"), leave: at("hand-leave") }, robot, () => act("mode manual"), (...words) => driving.tell(...words));
@@ -83,9 +86,18 @@ const where = new Where(link, { dialog: at("where"), form: at("where-form"), sai
 const wheel = new Wheel(link, { button: at("control"), name: at("name") }, robot, driving, where);
 const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: at("hand-over"), keep: at("keep") }, robot, () => driving.letGo());
 const setup = new Setup(link, {
-  form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
+  form: at("warehouse"), products: at("products"), add: at("add-product"), said: at("setup-said"), floor: at("floor-size"),
+  undo: at("undo"), redo: at("redo"), undoes: at("undo-what"), unsaved: at("unsaved"), discard: at("discard"),
   saveFile: at("save-file"), loadFile: at("load-file"), mapString: at("map-string"), goodsString: at("goods-string"),
-});
+}, { drawn: drawWarehouse, isOpen: isSetUp });
+const onMap = new OnMap(map, { edits: setup.edits, changed: () => setup.fill(), mayEdit: () => link.mayDrive });
+const rename = new Rename(map, {
+  form: at("rename"), number: at("rename-number"), name: at("rename-name"), move: at("rename-move"), remove: at("rename-remove"), close: at("rename-close"),
+}, onMap);
+map.scaledAnew = () => onMap.draw(isSetUp());
+const uses = new Uses(link, {
+  where: at("kept-where"), robots: at("kept-robots"), ask: at("renew"), box: at("renew-box"), question: at("renew-question"), yes: at("renew-yes"), no: at("renew-no"), said: at("renew-said"),
+}, robot);
 const line = new Line({
   gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), said: at("board-said"),
   calibrate: at("calibrate"), steps: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"),
@@ -116,6 +128,18 @@ const health = new Health(link, {
 const help = new Help({ dialog: at("help"), body: at("help-body"), open: at("help-open"), close: at("help-close"), legend: at("map-legend") }, () => at("armed").checked);
 switchesTheme(at("theme"));
 
+/** Whether the map is the warehouse that is set up, and no robot is told anything by it. */
+function isSetUp() {
+  return !at("setup").hidden;
+}
+
+/** Draws the warehouse that is kept or, while it is set up, the one that it would become. */
+function drawWarehouse() {
+  const warehouse = isSetUp() ? setup.edits.now : link.warehouse;
+  at("map-zone").classList.toggle("empty", !warehouse);
+  map.setWarehouse(warehouse);
+}
+
 /**
  * Has the robot in view do something, and tells where one drives why not.
  *
@@ -141,6 +165,7 @@ at("language").onclick = () => {
   change();
   translate();
   words();
+  map.redraw();
 };
 
 // Space is STOP, so a box is ticked by Enter.
@@ -164,6 +189,7 @@ for (const tab of every("[role=tab]", HTMLButtonElement)) {
 
 /** @param {HTMLElement} tab */
 function show(tab) {
+  const wasSetUp = isSetUp();
   document.body.dataset.view = tab.getAttribute("aria-controls") ?? "";
   for (const other of every("[role=tab]", HTMLButtonElement)) {
     const chosen = other === tab;
@@ -172,8 +198,12 @@ function show(tab) {
     document.getElementById(other.getAttribute("aria-controls") ?? "")?.toggleAttribute("hidden", !chosen);
   }
   driving.letGo();
-  // Who drives sees what is now.
-  if (tab.id === "tab-drive") moment.back();
+  // Who drives or sets up sees what is now.
+  if (tab.id === "tab-drive" || isSetUp()) moment.back();
+  if (wasSetUp === isSetUp()) return;
+  rename.close();
+  drawWarehouse();
+  map.fit();
 }
 
 /** Words that change with the language or with who looks. */
@@ -182,6 +212,7 @@ function words() {
   for (const element of every(".driver-only", HTMLElement)) element.toggleAttribute("disabled", !link.mayDrive);
   nameTheme(at("theme"));
   if (help.dialog.open) help.write();
+  setup.draw();
 }
 
 link.addEventListener("robots", () => {
@@ -198,10 +229,9 @@ at("robot").onchange = () => {
   byHand.leave();
 };
 link.addEventListener("warehouse", () => {
-  at("map-zone").classList.toggle("empty", !link.warehouse);
-  map.setWarehouse(link.warehouse);
+  setup.kept(link.warehouse);
+  drawWarehouse();
   missions.setWarehouse(link.warehouse);
-  setup.setWarehouse(link.warehouse);
 });
 link.addEventListener("link", words);
 words();
@@ -272,6 +302,7 @@ function drawRest(shown, time, seen, then) {
   timeLine.draw(shown);
   signals.draw(shown, time);
   line.draw(shown);
+  if (isSetUp()) uses.draw();
   asked.draw(shown);
   byHand.draw(shown);
   log.draw(shown);
@@ -279,7 +310,7 @@ function drawRest(shown, time, seen, then) {
   notify.draw(time);
   wheel.draw(shown);
   health.draw(shown, time);
-  if (!link.warehouse) put(at("map-said"), say("no_map"));
+  if (!map.warehouse) put(at("map-said"), say("no_map"));
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
 

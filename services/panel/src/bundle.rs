@@ -12,8 +12,8 @@
 //!
 //! An `import` stands in one line and names the things that it imports. An `export` stands before
 //! its `const`, `function` or `class`. The page's modules use no other form, and a test checks
-//! that. Comments that have lines of their own are left out, but not from what others have written
-//! (`vendor/`): their licence stands there.
+//! that. Indentation and comments that have lines of their own are left out, but not from what others
+//! have written (`vendor/`): their licence stands there.
 //!
 //! What the page needs later is a script of its own, which shares the modules of the first one:
 //!
@@ -113,7 +113,7 @@ impl Bundle {
                 body.push_str(rest);
                 body.push('\n');
             } else if !(is_ours && begins.starts_with("//")) {
-                body.push_str(line);
+                body.push_str(if is_ours { begins } else { line });
                 body.push('\n');
             }
         }
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(
             bundle("main.js", source).script,
             "const $c = (() => {\nconst c = 1;\nclass d {}\nconst hidden = 2;\nreturn { c, d };\n})();\n\
-             const $in_b = (() => {\nconst { c } = $c;\nfunction b(x) {\n  return x + c;\n}\nreturn { b };\n})();\n\
+             const $in_b = (() => {\nconst { c } = $c;\nfunction b(x) {\nreturn x + c;\n}\nreturn { b };\n})();\n\
              const $main = (() => {\nconst { b } = $in_b;\nconst { c, d } = $c;\nb(c);\nreturn {  };\n})();\n\
              export { $c, $in_b, $main };\n"
         );

@@ -33,6 +33,7 @@ mod stop;
 mod visit;
 
 use std::collections::BTreeSet;
+use std::fmt;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
@@ -92,6 +93,32 @@ pub struct Panel {
     shared: Arc<Shared>,
 }
 
+/// The simulated world of one robot, in place of which another one can be made.
+pub struct World {
+    pub(crate) robot: Name,
+    pub(crate) renew: Box<dyn Fn() -> Result<(), Reason> + Send + Sync>,
+}
+
+impl World {
+    /// `renew` has the robot's supervisor stop the robot and make the world of the warehouse that
+    /// the station has saved, or says why there can be no such world.
+    pub fn new(
+        robot: Name,
+        renew: impl Fn() -> Result<(), Reason> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            robot,
+            renew: Box::new(renew),
+        }
+    }
+}
+
+impl fmt::Debug for World {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_tuple("World").field(&self.robot).finish()
+    }
+}
+
 /// What all its pages share.
 #[derive(Debug)]
 pub(crate) struct Shared {
@@ -100,6 +127,8 @@ pub(crate) struct Shared {
     pub(crate) changes: watch::Sender<u64>,
     /// Who asks for which robot's wheel.
     pub(crate) handover: Mutex<Handover>,
+    /// The simulated robot that can get another world.
+    pub(crate) world: Option<World>,
     access: Access,
     /// Numbers for pages.
     pages: AtomicU32,
@@ -142,6 +171,7 @@ impl Panel {
                 handle,
                 changes: watch::Sender::new(0),
                 handover: Mutex::default(),
+                world: None,
                 access: Access::new(address, tokens),
                 pages: AtomicU32::new(0),
                 names: Mutex::default(),
@@ -149,6 +179,16 @@ impl Panel {
                 reads: Arc::new(Semaphore::new(history::MOST)),
             }),
         })
+    }
+
+    /// Lets pages put this simulated robot into the warehouse that the station has saved.
+    #[must_use]
+    pub fn with_world(mut self, world: World) -> Self {
+        // No page shares it yet.
+        if let Some(shared) = Arc::get_mut(&mut self.shared) {
+            shared.world = Some(world);
+        }
+        self
     }
 
     /// Where it listens.

@@ -11,6 +11,8 @@
 //! take <robot> <number>             take the wheel, or ask the person who drives for it
 //! free <robot> <number>             leave the wheel; the person who has asked gets it
 //! keep <robot> <number>             refuse to hand over the wheel
+//! renew <robot> <number>            stop a simulated robot and put it on the delivery node of the
+//!                                   warehouse that the station has saved
 //! warehouse <number> <json>         describe another warehouse, in the fields of the station's file
 //! here <ms>                         the page is there; once a second
 //! ```
@@ -27,7 +29,10 @@
 //! time <ms> [<here>]                the station's clock, in ms since 1970, first and after each `here`,
 //!                                   which it then repeats, so that the page knows its round trip
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
-//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
+//! kept <path>                       where the station keeps it
+//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] uses=<what> renews=0|1
+//!       [age_ms=<int>]              which warehouse it uses: `this`, `told` or `driven` (other goods),
+//!                                   `floor_before`, `world_before` (simulated), or `-`: not known
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>
 //!                                   <what>`: a person here wants an action or `stop`, has taken the
 //!                                   wheel (`take`), asks for it (`ask`), keeps or leaves it (`keep`,
@@ -68,6 +73,8 @@ pub(crate) enum Said {
     Take { robot: Name, number: u32 },
     /// Leave it.
     Free { robot: Name, number: u32 },
+    /// Put a simulated robot into the saved warehouse.
+    Renew { robot: Name, number: u32 },
     /// Keep it, whoever asks.
     Keep { robot: Name, number: u32 },
     /// The page is there.
@@ -110,10 +117,10 @@ pub(crate) fn read(line: &str) -> Result<Said, Unread> {
         "here" => Ok(Said::Here {
             said_ms: read_number(rest)?,
         }),
-        "do" | "stop" | "take" | "free" | "keep" => read_for_robot(word, rest),
+        "do" | "stop" | "take" | "free" | "keep" | "renew" => read_for_robot(word, rest),
         _ => Err(Unread::new(
             None,
-            "a page says do, stop, take, free, keep, warehouse or here",
+            "a page says do, stop, take, free, keep, renew, warehouse or here",
         )),
     }
 }
@@ -174,6 +181,7 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
         ("take", "") => Ok(Said::Take { robot, number }),
         ("free", "") => Ok(Said::Free { robot, number }),
         ("keep", "") => Ok(Said::Keep { robot, number }),
+        ("renew", "") => Ok(Said::Renew { robot, number }),
         _ => Err(Unread::new(
             Some(number),
             "nothing belongs behind the number",

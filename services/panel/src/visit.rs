@@ -10,7 +10,7 @@ use lager_lines::extension::Spelled;
 use lager_orders::{Action, Code, Late, Mode, Reason};
 use lager_plant::Warehouse;
 use lager_station::{
-    Awaited, Doing, Driver, Given, History, LastTold, Reply, Saving, Subscription, View,
+    Awaited, Doing, Driver, Given, History, LastTold, Reply, Saving, Subscription, Uses, View,
 };
 use tokio::sync::watch;
 
@@ -131,6 +131,7 @@ impl Visit {
         let (Said::Do { number, .. }
         | Said::Stop { number, .. }
         | Said::Keep { number, .. }
+        | Said::Renew { number, .. }
         | Said::Take { number, .. }
         | Said::Free { number, .. }
         | Said::Warehouse { number, .. }) = said
@@ -163,6 +164,10 @@ impl Visit {
                 self.answer(number, "done");
             }
             Said::Keep { .. } => self.refuse(number, Code::NotDriver),
+            Said::Renew { robot, .. } => match self.renew(&robot) {
+                Ok(()) => self.answer(number, "done"),
+                Err(why) => self.refuse(number, why),
+            },
             Said::Warehouse { warehouse, .. } => match handle.set_warehouse(*warehouse) {
                 Ok(saving) => {
                     self.saving.push((number, saving));
@@ -174,6 +179,25 @@ impl Visit {
             },
             Said::Stop { .. } | Said::Here { .. } => {}
         }
+    }
+
+    /// Stops a simulated robot, and has it put into the saved warehouse.
+    fn renew(&self, robot: &Name) -> Result<(), Reason> {
+        let world = self.page.shared.world.as_ref();
+        let Some(world) = world.filter(|world| world.robot == *robot) else {
+            return Err(Reason::new(Code::FloorElsewhere, &[robot]));
+        };
+        let driver = self
+            .driver_of(robot)
+            .filter(|_| !self.wheels.contains_key(robot));
+        if let Some(by) = driver {
+            return Err(Reason::new(Code::AskDriver, &[&by]));
+        }
+        // The supervisor stops one, too, that this stop does not reach.
+        if self.page.shared.handle.stop(robot).is_ok() {
+            self.note(robot, "stop");
+        }
+        (world.renew)()
     }
 
     /// Takes a free wheel, or asks another page for it.
@@ -381,6 +405,9 @@ impl Visit {
         if let Ok(json) = serde_json::to_string(&now) {
             let _ = writeln!(self.lines, "warehouse {json}");
         }
+        if let Some(path) = self.page.shared.handle.kept_in() {
+            let _ = writeln!(self.lines, "kept {}", path.display());
+        }
         self.warehouse = Some(now);
     }
 
@@ -389,6 +416,9 @@ impl Visit {
         let connected = u8::from(view.doing != Doing::Away);
         let speaks = u8::from(view.is_extended);
         let driver = view.driver.as_deref().unwrap_or("-");
+        let uses = view.uses.as_ref().map_or("-", Uses::as_str);
+        let world = self.page.shared.world.as_ref();
+        let renews = u8::from(world.is_some_and(|world| world.robot == *name));
         let age = shown.state.as_ref().map(|state| state.age(view.now));
         let _ = write!(
             self.lines,
@@ -398,6 +428,7 @@ impl Visit {
         if let Some(who) = asks {
             let _ = write!(self.lines, " asks={who}");
         }
+        let _ = write!(self.lines, " uses={uses} renews={renews}");
         if let Some(age) = age {
             let _ = write!(self.lines, " age_ms={}", age.as_millis());
         }

@@ -23,7 +23,7 @@
 
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -37,7 +37,7 @@ use crate::given::Given;
 use crate::history::History;
 use crate::robot::Doing;
 use crate::shown::{Saying, Shown};
-use crate::station::{RobotSaid, Station, Wish, WishRefused};
+use crate::station::{RobotSaid, Station, Uses, Wish, WishRefused};
 use crate::wheel::Key;
 
 /// The station's clock starts at this time, so that earlier events of robots have a time as well.
@@ -81,6 +81,8 @@ pub struct View {
     pub is_extended: bool,
     /// The person who drives it by actions.
     pub driver: Option<String>,
+    /// Which warehouse it uses, if it is here and the station has told it all of one.
+    pub uses: Option<Uses>,
     /// The last report of each kind.
     pub shown: Shown,
     /// The moment, by the station's clock; see [`Dated::age`](crate::Dated::age).
@@ -98,11 +100,17 @@ impl Handle {
                 doing: robot.doing(),
                 is_extended: robot.name().is_some(),
                 driver: robot.driver().map(str::to_owned),
+                uses: robot.is_described().then(|| Uses::of(name.clone(), robot)),
                 shown: robot.shown().clone(),
                 now,
             };
             station.robots().map(view).collect()
         })
+    }
+
+    /// The warehouse's file, if it has one.
+    pub fn kept_in(&self) -> Option<&Path> {
+        self.shared.kept_in.as_deref()
     }
 
     /// What the station keeps of the last day, if it does.

@@ -279,6 +279,7 @@ mod tests {
             doing: Doing::Fetching,
             is_extended: true,
             driver: None,
+            uses: None,
             shown: Shown {
                 state: Some(Dated { value, at: now }),
                 ..Shown::default()

@@ -160,6 +160,11 @@ impl Children {
         }
     }
 
+    /// From now on children start with this configuration, in TOML.
+    pub fn configure(&mut self, config: String) {
+        self.config = config;
+    }
+
     /// Starts `service`, for the first time or again, and returns its process.
     pub fn start(&mut self, service: Service, start: Start) -> Result<u32> {
         match self.known.iter_mut().find(|(known, _)| *known == service) {

@@ -7,6 +7,8 @@
 //!     ^                                             │
 //!     +-- all ended, in order; what is left swept <-+ the bus is damaged
 //!         after a while, each time a longer one (`resets.rs`)
+//!     ^
+//!     +-- all ended, in order, and at once <-- a simulated robot gets another world
 //! ```
 //! A service that ends or falls silent is restarted alone, once the attendant has the state from
 //! which it goes on. The bus counts as damaged if that would not help: a process that hangs before
@@ -51,6 +53,8 @@ pub(crate) enum Event {
     Due(Service),
     /// The new start is prepared.
     Restored,
+    /// The robot gets another simulated world.
+    Renewed,
 }
 
 /// Something to do.
@@ -159,6 +163,7 @@ impl Course {
             return match event {
                 Event::Restored => self.begin(now),
                 Event::Damaged(why) => self.begin_again(&why, now),
+                Event::Renewed => self.renew(now),
                 _ => Vec::new(),
             };
         }
@@ -191,6 +196,7 @@ impl Course {
             }
             Event::Due(service) => self.due(service),
             Event::Restored => Vec::new(),
+            Event::Renewed => self.renew(now),
         }
     }
 
@@ -343,6 +349,14 @@ impl Course {
             true => vec![self.start(service, true)],
             false => Vec::new(),
         }
+    }
+
+    /// Ends everything, and starts it in another world, in which nothing has happened yet.
+    fn renew(&mut self, now: Duration) -> Vec<Step> {
+        self.joined = false;
+        self.resets.renew();
+        self.enter(Stage::Resting(now), now);
+        vec![Step::StopAll(None)]
     }
 
     /// Begins again after these steps.

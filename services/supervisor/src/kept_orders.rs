@@ -284,6 +284,19 @@ impl Keeping {
     pub fn begin_again(&mut self) {
         self.left = self.all.clone();
     }
+
+    /// Drops the orders for other products than these. Returns the products of those orders.
+    pub fn keep_only(&mut self, products: &[i32]) -> Vec<i32> {
+        let mut all = self.all.clone();
+        let (fit, unfit) = all
+            .orders
+            .iter()
+            .partition(|it| products.contains(&it.product));
+        all.orders = fit;
+        let unfit: Vec<KeptOrder> = unfit;
+        self.take(all.clone(), all);
+        unfit.into_iter().map(|order| order.product).collect()
+    }
 }
 
 fn write(path: &Path, kept: &KeptOrders) -> io::Result<()> {
@@ -426,5 +439,22 @@ mod tests {
         file.keep(KeptOrders::default());
         drop(file);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn orders_for_goods_that_are_not_there_are_dropped_and_told() {
+        let order = |id, product| KeptOrder { id, product };
+        let kept = KeptOrders {
+            gone: Vec::new(),
+            orders: vec![order(1, 3), order(2, 9), order(3, 5)],
+        };
+        let mut keeping = Keeping {
+            left: KeptOrders::default(),
+            all: kept,
+            file: None,
+        };
+        assert_eq!(keeping.keep_only(&[9, 10]), [3, 5]);
+        assert_eq!(keeping.left().orders, [order(2, 9)]);
+        assert_eq!(keeping.all.orders, [order(2, 9)]);
     }
 }

@@ -38,6 +38,6 @@ pub mod stopped;
 mod terminal;
 
 pub use children::Parent;
-pub use robot::{Plan, Robot};
+pub use robot::{Plan, Robot, World};
 pub use service::Service;
 pub use terminal::Terminal;

@@ -9,7 +9,7 @@
 //! ```
 //! Either way it is watched here. A product counts as delivered when logic says so. The robot is
 //! put into autonomous mode at the beginning, unless somebody has set its mode before; from then on
-//! that is a person's.
+//! that is a person's. In another world it begins anew, though the mission of before is given up.
 //!
 //! A process that takes a mission over from a killed one starts from its [`Mission`]: an order that
 //! logic has not shown yet is given again under its number, which logic takes for a repeat.
@@ -129,6 +129,12 @@ impl Mission {
         }
     }
 
+    /// The robot is in another world, where nothing has begun. Gives the mission of before up.
+    pub fn leave_world(&mut self, why: &str) {
+        self.give_up(why);
+        self.begun = false;
+    }
+
     /// Takes down what logic has delivered.
     fn count(&mut self, status: &NavigatorStatus) {
         let before = self.counted.replace(status.delivered);
@@ -215,10 +221,12 @@ impl Watch {
         let queue = seen.queue.unwrap_or_default();
         self.mission.count(&status);
         self.mission.see(&status, &queue);
-        if self.mission.outcome().is_some() {
+        let is_over = self.mission.outcome().is_some();
+        if is_over && self.mission.begun {
             return None;
         }
-        if let Some(hopeless) = self.hopeless(now.robot, &health, &status, &queue, seen) {
+        if !is_over && let Some(hopeless) = self.hopeless(now.robot, &health, &status, &queue, seen)
+        {
             self.mission.give_up(&hopeless.why);
             self.mission.failure_kind = hopeless.kind;
             self.mission.hold = hopeless.hold;
@@ -237,6 +245,9 @@ impl Watch {
                 ..Ask::default()
             };
             return Some(Act::Ask { id: 0, ask });
+        }
+        if self.mission.outcome().is_some() {
+            return None;
         }
         let (id, product) = *self.mission.unseen.front()?;
         let has_room = queue.orders().len() < MOST_WAITING;

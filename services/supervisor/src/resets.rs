@@ -70,6 +70,13 @@ impl Resets {
         core::mem::replace(&mut self.was_whole, true)
     }
 
+    /// The robot gets another world: no service goes on from what was before.
+    pub(crate) fn renew(&mut self) {
+        self.have_been = true;
+        self.whole_since = None;
+        self.was_whole = false;
+    }
+
     /// The bus is damaged.
     pub(crate) fn damaged(&mut self, now: Duration) -> Remedy {
         let held = self

@@ -54,6 +54,8 @@ pub struct Plan {
     pub eeprom: Option<PathBuf>,
     /// The copy of its warehouse's file, if it runs in one.
     pub warehouse: Option<WarehouseCopy>,
+    /// Makes the world of the warehouse that its own station has saved, if it is simulated.
+    pub renewal: Option<Box<dyn Fn() -> Result<World>>>,
     /// The products that it has to fetch.
     pub mission: Mission,
     /// Its orders, and the file that keeps them for another `up`.
@@ -62,6 +64,16 @@ pub struct Plan {
     pub first_notes: Vec<String>,
     /// Whether to end when the mission has ended.
     pub exit_when_done: bool,
+}
+
+/// Another world for a simulated robot.
+pub struct World {
+    /// The configuration of the robot's processes, in TOML.
+    pub config: String,
+    /// Its warehouse.
+    pub warehouse: WarehouseCopy,
+    /// The products that it has.
+    pub products: Vec<i32>,
 }
 
 /// A robot that is up.
@@ -79,6 +91,8 @@ pub struct Robot {
     terminal: Terminal,
     /// How long the body could have run while services waited for its clock.
     body: Option<ChanceClock>,
+    /// The products of a world that the robot gets now.
+    products: Option<Vec<i32>>,
     began: Instant,
     folder_looked: Instant,
     /// What others were told last of the services.
@@ -115,6 +129,7 @@ impl Robot {
             signals,
             terminal,
             body: None,
+            products: None,
             began: now,
             folder_looked: now,
             told: Vec::new(),
@@ -194,6 +209,10 @@ impl Robot {
 
     /// Takes what has come, and does what must be done now.
     fn turn(&mut self) -> Result<()> {
+        // While it rests, too: a request that stays unread would never let it sleep.
+        if self.signals.renewal_asked() {
+            self.renew()?;
+        }
         let due = self.course.look(self.now());
         self.carry_out(due)?;
         if self.course.rests() {
@@ -221,6 +240,29 @@ impl Robot {
             self.lock.tell(&services);
             self.told = services;
         }
+    }
+
+    /// Stops the robot and, if it is simulated, puts it on the delivery node of the warehouse that
+    /// its station has saved. Either way it stands until a person releases this stop: one who has
+    /// released an earlier stop did not know of the new world.
+    fn renew(&mut self) -> Result<()> {
+        let world = self.lock.stop().and_then(|()| match &self.plan.renewal {
+            Some(renewal) => renewal(),
+            None => bail!("only a simulated robot with its own station can leave it, and none that ends with its mission"),
+        });
+        let world = match world {
+            Ok(world) => world,
+            Err(error) => {
+                self.note(&format!("the robot stays in its warehouse: {error:#}"));
+                return Ok(());
+            }
+        };
+        self.note("the robot is stopped and put on the delivery node of the warehouse that was saved; `lager resume` lets it move");
+        self.children.configure(world.config.clone());
+        self.plan.config = world.config;
+        self.plan.warehouse = Some(world.warehouse);
+        self.products = Some(world.products);
+        self.happened(Event::Renewed)
     }
 
     fn happened(&mut self, event: Event) -> Result<()> {
@@ -263,12 +305,15 @@ impl Robot {
             eeprom,
             warehouse,
             keeping,
+            mission,
             ..
         } = &mut self.plan;
         let restored = self
             .lock
             .restore(bus, config, eeprom.as_deref())
-            .and_then(|()| warehouse.as_ref().map(WarehouseCopy::write).transpose());
+            .and_then(|()| warehouse.as_ref().map(WarehouseCopy::write).transpose())
+            // Somebody may have released the stop before the last service ended.
+            .and_then(|_| self.products.as_ref().map(|_| self.lock.hold()).transpose());
         if let Err(error) = restored {
             if matches!(error.downcast_ref(), Some(LockError::Up { .. })) {
                 return Err(error);
@@ -278,6 +323,16 @@ impl Robot {
         self.told.clear();
         // Nobody knows the robot's orders any more, and a simulated world is a new one.
         keeping.begin_again();
+        let products = self.products.take();
+        if products.is_some() {
+            mission.leave_world("the robot was put into another warehouse in the middle of it");
+        }
+        let dropped = products.map(|products| keeping.keep_only(&products));
+        for product in dropped.unwrap_or_default() {
+            self.note(&format!(
+                "the order for goods {product} is dropped: it is not in this warehouse"
+            ));
+        }
         self.happened(Event::Restored)
     }
 
@@ -329,7 +384,7 @@ impl Robot {
 
     fn wait(&self) {
         let at_most = self.course.idle(self.now(), LOOK);
-        let mut sources = vec![self.signals.as_fd()];
+        let mut sources = vec![self.signals.as_fd(), self.signals.renewal()];
         sources.extend(self.attendant.line.as_ref().map(AsFd::as_fd));
         self.children.wait(&sources, at_most);
     }

@@ -13,6 +13,7 @@ use lager_home::{Home, Life, Lock, UnitName, Watched};
 use lager_lines::secret::Secret;
 use lager_ports::BusConfig;
 use lager_stop::{StopPage, StopWord};
+use lager_topics::{Role, StopCause};
 
 use crate::service::Service;
 
@@ -186,6 +187,32 @@ impl NameLock {
     /// Whether the folder still exists, with this very lock in it.
     pub fn is_held(&self) -> bool {
         self.lock.as_ref().is_some_and(Lock::is_in_place)
+    }
+
+    /// Stops the robot, and replaces a stop that is set: who releases the earlier one does not
+    /// know of this one.
+    ///
+    /// # Errors
+    /// The word cannot be written.
+    pub fn stop(&self) -> Result<()> {
+        StopWord::set(
+            &self.folder.join(StopPage::FILE),
+            Role::Supervisor,
+            StopCause::Ordered,
+        )?;
+        Ok(())
+    }
+
+    /// Stops the robot unless a stop is set.
+    ///
+    /// # Errors
+    /// The word cannot be read or written.
+    pub fn hold(&self) -> Result<()> {
+        let told = StopWord::read(&self.folder.join(StopPage::FILE))?;
+        match told.and_then(|told| told.stop()) {
+            Some(_) => Ok(()),
+            None => self.stop(),
+        }
     }
 
     /// Makes sure that others find this robot by its lock.

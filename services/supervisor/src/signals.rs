@@ -16,7 +16,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use lager_home::Clock;
 use lager_wake::Shutdown;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXCPU, SIGXFSZ};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXCPU, SIGXFSZ};
 use signal_hook::low_level::{self, pipe};
 
 /// The exit code of a process that Ctrl-C has ended, as in shells.
@@ -105,11 +105,13 @@ impl Press {
     }
 }
 
-/// The requests to end.
+/// The requests to end, and those for another world.
 pub struct Signals {
     wakes: UnixStream,
     interrupted: Arc<AtomicBool>,
     asked: bool,
+    /// Wakes a sleeping robot only.
+    renews: UnixStream,
 }
 
 impl Signals {
@@ -125,7 +127,11 @@ impl Signals {
             for signal in ENDS {
                 pipe::register(signal, wake.try_clone()?)?;
             }
+            let (renews, renew) = UnixStream::pair()?;
+            renews.set_nonblocking(true)?;
+            pipe::register(SIGUSR1, renew)?;
             Ok(Self {
+                renews,
                 wakes,
                 interrupted,
                 asked: false,
@@ -141,6 +147,22 @@ impl Signals {
             self.asked = true;
         }
         self.asked
+    }
+
+    /// Whether the robot's own station has asked for the world that it has saved (SIGUSR1), since
+    /// the last call.
+    pub fn renewal_asked(&mut self) -> bool {
+        let mut some = [0; 64];
+        let mut is_asked = false;
+        while matches!(self.renews.read(&mut some), Ok(count) if count > 0) {
+            is_asked = true;
+        }
+        is_asked
+    }
+
+    /// What becomes readable when the robot's own station asks for another world.
+    pub fn renewal(&self) -> BorrowedFd<'_> {
+        self.renews.as_fd()
     }
 
     /// Whether Ctrl-C has come since it was last forgotten.

@@ -13,7 +13,9 @@
 //! So two buses share nothing (tests rely on that), and the user's own robot finds its files again.
 //!
 //! A robot runs in a copy of the warehouse's file, made at its start. So a service that starts
-//! again finds the same world, whatever somebody has saved since.
+//! again finds the same world, whatever somebody has saved since. Only when a person at the panel
+//! puts a simulated robot into the saved warehouse, the copy is made anew, and everything starts
+//! again in it (`Robot::renew`).
 
 use std::env;
 use std::fs::{self, DirBuilder};

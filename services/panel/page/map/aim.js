@@ -6,7 +6,7 @@
 /** @import { WarehouseMap } from "./map.js" */
 /** @import { Offer } from "./offers.js" */
 
-import { meant, nearest, nextTo } from "./grid.js";
+import { again, meant, nearest, nextTo } from "./grid.js";
 import { meets } from "./labels.js";
 import { put, say } from "../words/words.js";
 
@@ -19,18 +19,26 @@ const OFF_PX = 16;
 /** @type {Record<string, Point>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
+/**
+ * What a drag does at a point of the floor in mm, at its end, and when it is over, whether it counts or not.
+ *
+ * @typedef {{ move: (point: Point) => void, end: () => void, cancel: () => void }} Grip
+ */
+
 export class Aim {
   /**
    * @param {WarehouseMap} map
    * @param {object} hand
    * @param {HTMLElement} hand.tip
    * @param {(target: Target | null) => Offer} hand.offers says what a thing is and does
+   * @param {(target: Target | null) => Grip | null} hand.grip what a drag that begins on it does, if not to move the map
    * @param {() => boolean} hand.isArmed whether the arrows drive
    */
-  constructor(map, { tip, offers, isArmed }) {
+  constructor(map, { tip, offers, grip, isArmed }) {
     this.map = map;
     this.tip = tip;
     this.offers = offers;
+    this.grip = grip;
     this.isArmed = isArmed;
     /**
      * What the pointer means now.
@@ -44,6 +52,9 @@ export class Aim {
      * @type {Target | null}
      */
     this.chosen = null;
+    /** Whether what was chosen may be elsewhere now, and whether it was chosen while the warehouse was set up. */
+    this.isOld = false;
+    this.wasPlacing = false;
     /** @type {{ id: string | null, at: number }} */
     this.clicked = { id: null, at: -Infinity };
     this.gestures(map.svg);
@@ -61,6 +72,14 @@ export class Aim {
     /** @type {Point | null} */
     let from = null;
     let moved = 0;
+    /** @type {Grip | null} */
+    let gripped = null;
+    /** @param {boolean} isDone */
+    const letGo = (isDone) => {
+      if (isDone && moved >= STILL_PX) gripped?.end();
+      gripped?.cancel();
+      gripped = null;
+    };
     const { map } = this;
     /** @type {Map<number, PointerEvent>} */
     const fingers = new Map();
@@ -74,6 +93,8 @@ export class Aim {
       from = map.point(event);
       // A second finger zooms, so the first one meets nothing.
       moved = fingers.size > 1 ? Infinity : 0;
+      letGo(false);
+      if (fingers.size === 1) gripped = this.grip(this.at(event));
       svg.setPointerCapture(event.pointerId);
     });
     svg.addEventListener("pointermove", (event) => {
@@ -89,15 +110,18 @@ export class Aim {
       moved += Math.hypot(event.movementX, event.movementY);
       if (moved < STILL_PX) return;
       this.point(null);
-      map.shift(from[0] - x, from[1] - y);
+      if (gripped) gripped.move([x, -y]);
+      else map.shift(from[0] - x, from[1] - y);
     });
     svg.addEventListener("pointerup", (event) => {
       fingers.delete(event.pointerId);
       if (from && moved < STILL_PX) this.click(this.at(event), event.timeStamp);
+      letGo(true);
       from = null;
     });
     svg.addEventListener("pointercancel", (event) => {
       fingers.delete(event.pointerId);
+      letGo(false);
       from = null;
     });
     svg.addEventListener("pointerleave", () => this.point(null));
@@ -167,8 +191,11 @@ export class Aim {
   current() {
     const { scene, view: [x, y, width, height] } = this.map;
     if (!scene.warehouse) return null;
-    // The squares' sides are meant only while goods are placed.
-    if (!this.chosen || (this.chosen.kind === "square") !== scene.isPlacing) this.chosen = nearest([x + width / 2, -y - height / 2], scene);
+    // What is set up and what is worked with are other things.
+    if (!this.chosen || this.wasPlacing !== scene.isPlacing) this.chosen = nearest([x + width / 2, -y - height / 2], scene);
+    else if (this.isOld) this.chosen = again(this.chosen, scene);
+    this.isOld = false;
+    this.wasPlacing = scene.isPlacing;
     return this.chosen;
   }
 
@@ -183,9 +210,10 @@ export class Aim {
     this.draw();
   }
 
-  /** Another warehouse has other things. */
+  /** Another warehouse has other things, or the same ones elsewhere. */
   forget() {
-    this.pointed = this.chosen = null;
+    this.pointed = null;
+    this.isOld = true;
   }
 
   /** The tip at what is meant: by the pointer or, while the map has the keys' focus, by them. */

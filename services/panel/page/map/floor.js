@@ -11,7 +11,7 @@ const BENDS = { straight: [], left: [90], right: [-90], s: [45, -45] };
 const STRAIGHT = 200;
 const BAR = 300;
 /** How far the floor goes beyond the outer tape, and the racks stay from the tape, in mm. */
-const BEYOND = 130;
+export const BEYOND = 130;
 export const INSIDE = 84;
 /** A rack's posts in mm. */
 const POST = 22;

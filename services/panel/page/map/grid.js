@@ -3,12 +3,14 @@
 /** @import { Side, Warehouse } from "../station/robot.js" */
 /** @import { Parcel } from "./goods.js" */
 
+import { BEYOND } from "./floor.js";
+
 /** @typedef {[number, number]} Point */
 /** @typedef {{ kind: "square", id: string, at: Point, square: Point, side: Side }} SquareSide */
 /**
- * What a pointer or a key means; `at` is in mm.
+ * What a pointer or a key means; `at` is in mm. An edge of the floor is its handle.
  *
- * @typedef {{ kind: "good" | "crossing" | "way", id: string, at: Point } | SquareSide} Target
+ * @typedef {{ kind: "good" | "crossing" | "way" | "corner" | "edge", id: string, at: Point } | SquareSide} Target
  */
 /**
  * What there is to mean.
@@ -18,7 +20,7 @@
  * @property {number} side of a square, in mm
  * @property {number} scale mm of one pixel
  * @property {Pick<Parcel, "id" | "x" | "y" | "size">[]} parcels
- * @property {boolean} isPlacing whether goods are being placed
+ * @property {boolean} isPlacing whether the warehouse is being set up
  */
 
 /**
@@ -31,6 +33,8 @@ export const SIDES = { left: [-1, 0], up: [0, 1], right: [1, 0], down: [0, -1] }
 /** How near a point means a crossing or a way: as a part of a square's side, and in pixels at least. */
 const NEAR = 0.15;
 const NEAR_PX = 8;
+/** How near to it a handle or a corner of the floor is meant, in pixels: as a finger is. */
+const GRIP_PX = 22;
 /** How far from its middle the side of a square is meant by keys, as a part of the square's side. */
 const ASIDE = 0.3;
 /** @type {Side[]} */
@@ -103,11 +107,28 @@ const wayAt = (words, side) => ({ kind: "way", id: words, at: way(words, side).m
 const good = ({ id, x, y }) => ({ kind: "good", id, at: [x, y] });
 
 /**
+ * The corners of a floor, and the handles by which it is made larger or smaller.
+ *
+ * @param {Point} size
+ * @param {number} side
+ * @returns {Target[]}
+ */
+function bounds([width, height], side) {
+  /** @type {(x: number, y: number) => Target} */
+  const corner = (x, y) => ({ kind: "corner", id: `${x},${y}`, at: [x * side, y * side] });
+  return [
+    corner(0, 0), corner(width, 0), corner(0, height), corner(width, height),
+    { kind: "edge", id: "right", at: [width * side + BEYOND, (height / 2) * side] },
+    { kind: "edge", id: "up", at: [(width / 2) * side, height * side + BEYOND] },
+  ];
+}
+
+/**
  * @param {number} x
  * @param {number} y
  * @param {Side} from
  * @param {number} side
- * @returns {Target}
+ * @returns {SquareSide}
  */
 function square(x, y, from, side) {
   const [dx, dy] = SIDES[from];
@@ -115,7 +136,21 @@ function square(x, y, from, side) {
 }
 
 /**
- * What a point in mm means: goods, a crossing or a way; while goods are placed, the side of a square; or null.
+ * The side of a square that a point in mm means; null outside.
+ *
+ * @param {Point} point
+ * @param {Pick<Scene, "warehouse" | "side">} scene
+ */
+export function sideAt([px, py], { warehouse, side }) {
+  const [width, height] = warehouse?.size ?? [0, 0];
+  const [gx, gy] = [px / side, py / side];
+  const [x, y] = [Math.floor(gx), Math.floor(gy)];
+  return x < 0 || y < 0 || x >= width || y >= height ? null : square(x, y, nearestSide(gx - x, gy - y), side);
+}
+
+/**
+ * What a point in mm means: goods, a crossing or a way; while the warehouse is set up, goods, a handle, a corner or the
+ * side of a square; or null.
  *
  * @param {Point} point
  * @param {Scene} scene
@@ -125,12 +160,12 @@ export function meant([px, py], { warehouse, side, scale, parcels, isPlacing }) 
   if (!warehouse) return null;
   const [width, height] = warehouse.size;
   const [gx, gy] = [px / side, py / side];
-  if (isPlacing) {
-    const [x, y] = [Math.floor(gx), Math.floor(gy)];
-    return x < 0 || y < 0 || x >= width || y >= height ? null : square(x, y, nearestSide(gx - x, gy - y), side);
-  }
   const hit = parcels.find(({ x, y, size }) => Math.max(Math.abs(px - x), Math.abs(py - y)) <= size / 2);
   if (hit) return good(hit);
+  if (isPlacing) {
+    const grip = bounds(warehouse.size, side).find(({ at: [x, y] }) => Math.hypot(px - x, py - y) < GRIP_PX * scale);
+    return grip ?? sideAt([px, py], { warehouse, side });
+  }
   const near = Math.min(0.3, Math.max(NEAR, (NEAR_PX * scale) / side));
   const [nx, ny] = [Math.round(gx), Math.round(gy)];
   const [isColumn, isRow] = [Math.abs(gx - nx) < near, Math.abs(gy - ny) < near];
@@ -149,7 +184,7 @@ export function meant([px, py], { warehouse, side, scale, parcels, isPlacing }) 
 function all({ warehouse, side, parcels, isPlacing }) {
   if (!warehouse) return [];
   const [width, height] = warehouse.size;
-  const found = isPlacing ? [] : parcels.map(good);
+  const found = [...parcels.map(good), ...(isPlacing ? bounds(warehouse.size, side) : [])];
   for (let x = 0; x <= width; x++) {
     for (let y = 0; y <= height; y++) {
       if (isPlacing) {
@@ -165,7 +200,8 @@ function all({ warehouse, side, parcels, isPlacing }) {
 }
 
 /**
- * The thing that is next from a point in mm in a direction; what lies aside counts as further. Null if there is none.
+ * The thing that is next from a point in mm in a direction; what lies aside counts as further, and what lies more aside
+ * than ahead only while the warehouse is set up, where nothing else is. Null if there is none.
  *
  * @param {Point} point
  * @param {Point} direction
@@ -176,14 +212,26 @@ export function nextTo([px, py], [dx, dy], scene) {
   /** @type {Target | null} */
   let best = null;
   let least = Infinity;
+  let isLeastAside = true;
   for (const target of all(scene)) {
     const [x, y] = [target.at[0] - px, target.at[1] - py];
     const [along, across] = [x * dx + y * dy, Math.abs(x * dy - y * dx)];
-    if (along <= 1 || across > along || along + 2 * across >= least) continue;
-    least = along + 2 * across;
-    best = target;
+    const [isAside, far] = [across > along, along + 2 * across];
+    if (along <= 1 || (isAside && !scene.isPlacing)) continue;
+    if (isAside === isLeastAside ? far >= least : isAside) continue;
+    [best, least, isLeastAside] = [target, far, isAside];
   }
   return best;
+}
+
+/**
+ * The same thing where it is now; if it is gone, what is nearest to where it was.
+ *
+ * @param {Target} target
+ * @param {Scene} scene
+ */
+export function again({ kind, id, at }, scene) {
+  return all(scene).find((one) => one.kind === kind && one.id === id) ?? nearest(at, scene);
 }
 
 /**

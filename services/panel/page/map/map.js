@@ -4,6 +4,7 @@
 
 /** @import { Robot as Model, Pose, Warehouse } from "../station/robot.js" */
 /** @import { Face } from "../bar/face.js" */
+/** @import { Grip } from "./aim.js" */
 /** @import { Point, Scene, Target } from "./grid.js" */
 /** @import { Box, Said } from "./labels.js" */
 /** @import { Offer } from "./offers.js" */
@@ -11,7 +12,7 @@
 import { Aim } from "./aim.js";
 import { Floor } from "./floor.js";
 import { Goods, carries } from "./goods.js";
-import { ends, way } from "./grid.js";
+import { ends, sideAt, way } from "./grid.js";
 import { Labels, meets } from "./labels.js";
 import { BODY, Robot } from "./robot.js";
 import { crossing } from "../words/sentences.js";
@@ -25,6 +26,9 @@ const GLIDE_MS = 100;
 const MARGIN_PX = 32;
 const ABOVE_PX = 40;
 const BELOW_PX = 64;
+/** While the warehouse is set up there are buttons above it, too, and its lengths stand beside it. */
+const MARGIN_SET_UP_PX = 72;
+const ABOVE_SET_UP_PX = 140;
 /** The numbers of the columns stand below the floor. */
 const NUMBERS_PX = 16;
 /** How far in and out one can zoom: the width of the view in mm. */
@@ -45,9 +49,9 @@ export class WarehouseMap {
    * @param {HTMLElement} parts.scaleBar
    * @param {HTMLDetailsElement} parts.legend
    * @param {Record<"zoomIn" | "zoomOut" | "fit" | "follow", HTMLElement>} parts.tools
-   * @param {{ tip: HTMLElement, offers: (target: Target | null) => Offer, isArmed: () => boolean, isPlacing: () => boolean }} parts.hand
-   *   is what `Aim` takes and `isPlacing`, whether a click places goods
-   * @param {(words: string) => void} parts.tell says something below the map
+   * @param {{ tip: HTMLElement, offers: (target: Target | null) => Offer, grip: (target: Target | null) => Grip | null, isArmed: () => boolean, isPlacing: () => boolean }} parts.hand
+   *   is what `Aim` takes and `isPlacing`, whether the warehouse is set up
+   * @param {(words?: string) => void} parts.tell says something below the map
    */
   constructor(svg, { words, scaleBar, legend, tools, hand, tell }) {
     this.svg = svg;
@@ -57,6 +61,8 @@ export class WarehouseMap {
     this.tell = tell;
     this.isPlacing = hand.isPlacing;
     this.followButton = tools.follow;
+    /** What else is drawn at the scale of the map. */
+    this.scaledAnew = () => {};
     /** @type {Warehouse | null} */
     this.warehouse = null;
     /**
@@ -151,6 +157,15 @@ export class WarehouseMap {
    */
   get scene() {
     return { warehouse: this.warehouse, side: this.side, scale: this.px, parcels: this.goods.parcels, isPlacing: this.isPlacing() };
+  }
+
+  /**
+   * The side of a square that a point in mm means; null outside.
+   *
+   * @param {Point} point
+   */
+  sideAt(point) {
+    return sideAt(point, this.scene);
   }
 
   /**
@@ -364,10 +379,17 @@ export class WarehouseMap {
     const [left, top, right, bottom] = this.floor.bounds;
     const { width, height } = this.size;
     const grow = FAR.matches ? 1.5 : 1;
-    const [margin, above, below] = [MARGIN_PX * grow, ABOVE_PX * grow, (BELOW_PX + NUMBERS_PX) * grow];
+    const [aside, over] = this.isPlacing() ? [MARGIN_SET_UP_PX, ABOVE_SET_UP_PX] : [MARGIN_PX, ABOVE_PX];
+    const [margin, above, below] = [aside * grow, over * grow, (BELOW_PX + NUMBERS_PX) * grow];
     const px = Math.max((right - left) / Math.max(1, width - 2 * margin), (top - bottom) / Math.max(1, height - above - below));
     this.view = [left - margin * px, -top - above * px, right - left + 2 * margin * px, top - bottom + (above + below) * px];
     this.follow(false);
+    this.show();
+  }
+
+  /** Draws at the same scale anew, in another language. */
+  redraw() {
+    this.scaled = null;
     this.show();
   }
 
@@ -431,6 +453,7 @@ export class WarehouseMap {
     this.px = px;
     this.svg.style.setProperty("--px", String(px));
     this.floor.scale(px);
+    this.scaledAnew();
     this.goods.draw(this.warehouse, this.side, px);
   }
 

@@ -1,8 +1,8 @@
 // What the things on the map are, and what a click on one does now: the one place for tip and click.
 
 /** @import { Link } from "../station/link.js" */
-/** @import { Robot, Side } from "../station/robot.js" */
-/** @import { Point, SquareSide, Target } from "./grid.js" */
+/** @import { Robot } from "../station/robot.js" */
+/** @import { Target } from "./grid.js" */
 
 import { carries, turnOf, wasDelivered } from "./goods.js";
 import { ends, oneName } from "./grid.js";
@@ -27,12 +27,13 @@ import { clock, say } from "../words/words.js";
  * @param {(crossing: string[]) => unknown} page.stands says where the robot stands
  * @param {() => boolean} page.isPlaceWanted whether that is to be said
  * @param {(way: string) => unknown} page.obstacle puts an obstacle there or takes it away
- * @param {(square: Point, side: Side) => unknown} page.goods puts goods at the side of a square
+ * @param {() => boolean} page.isSetUp whether the map shows the warehouse that is set up
+ * @param {(target: Target) => Offer} page.setUp what a thing is and does then
  * @param {() => number} page.now
  * @param {() => boolean} page.isPast whether the map shows the past; `robot` is the past one then
  * @returns {(target: Target | Tile | null) => Offer}
  */
-export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now, isPast }) {
+export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, isSetUp, setUp, now, isPast }) {
   /**
    * Goods are fetched; those that are not in their place, after a question.
    *
@@ -91,14 +92,6 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
   }
 
   /**
-   * @param {SquareSide} target
-   * @returns {Offer}
-   */
-  function place({ square, side }) {
-    return { what: say("tip_square", square.join(","), say(side)), does: say("does_goods"), act: () => goods(square, side) };
-  }
-
-  /**
    * Why a robot is told nothing now.
    *
    * @param {Robot | null} shown
@@ -117,11 +110,13 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
    */
   function offer(target) {
     if (!target) return { why: say("nothing_here") };
-    if (target.kind === "square") return place(target);
     if (target.kind === "good") return good(target.id, "hand" in target ? target.hand : undefined);
     return target.kind === "crossing" ? node(target.id) : way(target.id);
   }
 
-  // While the map shows the past, nothing on it is ordered.
-  return (target) => (isPast() ? { what: offer(target).what, why: say("past_orders") } : offer(target));
+  return (target) => {
+    // While the warehouse is set up or the map shows the past, nothing on it is ordered.
+    if (isSetUp()) return target && !("hand" in target) ? setUp(target) : { why: say("set_up_how") };
+    return isPast() ? { what: offer(target).what, why: say("past_orders") } : offer(target);
+  };
 }

@@ -1,44 +1,76 @@
-// Setting up: the warehouse by form, file and strings, with checks as one types.
+// Setting up: the warehouse by form, file and strings, with checks as one types. On the map it is set up, too (onmap.js);
+// what was changed can be undone (edits.js), and counts once it is saved.
 
-import { judge, wrong } from "../parts/fields.js";
+/** @import { Link } from "../station/link.js" */
+/** @import { Warehouse } from "../station/robot.js" */
+/** @import { Said } from "./edits.js" */
+
+import { field, judge, wrong } from "../parts/fields.js";
+import { Edits, placed, wrongFloor, wrongGoods } from "./edits.js";
+import { Rows } from "./rows.js";
+import { readFile, readGoods, readMap, wrongDrawing } from "./written.js";
 import { reason } from "../words/sentences.js";
 import { LIMITS } from "../words/table.js";
-import { put, say, translate } from "../words/words.js";
+import { decimal, put, say } from "../words/words.js";
 
-const SIDES = ["left", "up", "right", "down"];
+/**
+ * The warehouse that goods are put into where there is none yet.
+ *
+ * @type {Warehouse}
+ */
+const FIRST = { size: [4, 3], side_length_cm: 40, delivery: [0, 0], product: [] };
+
+/**
+ * @typedef {{ form: HTMLFormElement, products: HTMLTableSectionElement }
+ *   & Record<"add" | "undo" | "redo" | "discard" | "saveFile", HTMLButtonElement>
+ *   & Record<"loadFile" | "mapString" | "goodsString", HTMLInputElement>
+ *   & Record<"said" | "floor" | "undoes" | "unsaved", HTMLElement>} Parts
+ */
 
 export class Setup {
-  constructor(link, parts) {
+  /**
+   * @param {Link} link
+   * @param {Parts} parts
+   * @param {object} page
+   * @param {() => void} page.drawn is called whenever another warehouse is to be drawn
+   * @param {() => boolean} page.isOpen whether it is in view
+   */
+  constructor(link, parts, { drawn, isOpen }) {
     this.link = link;
     this.parts = parts;
-    this.past = [];
-    this.dirty = false;
+    this.drawn = drawn;
+    this.isOpen = isOpen;
+    this.edits = new Edits();
+    this.isSaving = false;
+    /** Whether somebody else has saved another warehouse while somebody is at work here. */
+    this.isElsewhere = false;
     const { form } = parts;
-    const { width, height, side } = form.elements;
-    width.max = height.max = LIMITS.squares;
-    [side.min, side.max] = [LIMITS.leastSideCm, LIMITS.mostSideCm];
+    /** @param {string} name */
+    const input = (name) => field(form, name, HTMLInputElement);
+    this.fields = { width: input("width"), height: input("height"), side: input("side"), delivery: field(form, "delivery", HTMLSelectElement) };
+    this.rows = new Rows(parts.products, parts.add, () => this.takeForm());
+    const { width, height, side } = this.fields;
+    width.max = height.max = String(LIMITS.squares);
+    side.min = String(LIMITS.leastSideCm);
+    side.max = String(LIMITS.mostSideCm);
     judge(form);
     form.addEventListener("input", ({ target }) => {
-      // What is pasted or loaded replaces the form's content as a whole.
-      if (!target.name) return;
-      this.dirty = true;
+      if (!isNamed(target)) return;
       this.corners();
       this.check();
     });
+    // What is typed is one change once the hand leaves the field.
+    form.addEventListener("change", ({ target }) => isNamed(target) && this.takeForm());
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      const why = wrong(form.elements);
-      if (why) put(parts.said, why);
-      else this.save(this.read());
+      this.save();
     });
-    parts.add.onclick = () => {
-      this.dirty = true;
-      this.row({ id: this.freeNumber(), square: [0, 0], side: "down" });
-      this.check();
-    };
-    parts.undo.onclick = () => this.undo();
+    parts.add.onclick = () => this.change(placed(this.edits.now ?? this.typed() ?? FIRST, [0, 0], "down"));
+    parts.undo.onclick = () => this.go("undo");
+    parts.redo.onclick = () => this.go("redo");
+    parts.discard.onclick = () => this.go("discard");
     parts.saveFile.onclick = () => this.saveFile();
-    parts.loadFile.onchange = () => parts.loadFile.files.length && this.loadFile(parts.loadFile.files[0]);
+    parts.loadFile.onchange = () => this.loadFile();
     parts.mapString.onchange = () => parts.mapString.value && this.pasteMap(parts.mapString.value);
     parts.goodsString.onchange = () => parts.goodsString.value && this.pasteGoods(parts.goodsString.value);
     for (const field of [parts.mapString, parts.goodsString]) {
@@ -49,28 +81,69 @@ export class Setup {
         field.blur();
       });
     }
-    this.drawUndo();
+    addEventListener("keydown", (event) => this.key(event));
+    this.draw();
   }
 
-  async undo() {
-    const before = this.past.at(-1);
-    if (before && (await this.save(before, false))) this.past.pop();
-    this.drawUndo();
+  /**
+   * Ctrl and S saves; Z undoes and Y or Shift and Z does it again, but in a field of text, whose own these are.
+   *
+   * @param {KeyboardEvent} event
+   */
+  key(event) {
+    const key = event.key.toLowerCase();
+    if (!this.isOpen() || !(event.ctrlKey || event.metaKey) || event.altKey || !this.link.mayDrive) return;
+    const isText = event.target instanceof Element && event.target.matches("input:not([type=number]), textarea");
+    if (key !== "s" && isText) return;
+    if (key === "s") this.save();
+    else if (key === "y" || (key === "z" && event.shiftKey)) this.go("redo");
+    else if (key === "z") this.go("undo");
+    else return;
+    event.preventDefault();
   }
 
-  drawUndo() {
-    this.parts.undo.disabled = !this.past.length;
+  /** @param {"undo" | "redo" | "discard"} step */
+  go(step) {
+    this.edits[step]();
+    this.fill();
   }
 
-  /** Puts goods at the side of a square, with the next number. */
-  place(square, side) {
-    this.dirty = true;
-    this.row({ id: this.freeNumber(), square, side });
-    return this.save(this.read());
+  /**
+   * Takes a changed warehouse.
+   *
+   * @param {Warehouse} warehouse
+   */
+  change(warehouse) {
+    if (this.edits.change(warehouse)) this.fill();
+    this.check();
+  }
+
+  /** The warehouse of the form, if all its fields are such that it can be one. */
+  typed() {
+    return wrong(this.parts.form.elements) ? null : this.read();
+  }
+
+  /** Takes what stands in the form; its fields are left as they are, since a hand is in them. */
+  takeForm() {
+    const warehouse = this.typed();
+    if (warehouse && !wrongFloor(warehouse) && this.edits.change(warehouse)) this.drawn();
+    this.check();
+  }
+
+  /**
+   * Takes a warehouse of somebody else's making, if it can be drawn.
+   *
+   * @param {Warehouse | null} warehouse
+   */
+  paste(warehouse) {
+    /** @type {Said | null} */
+    const why = warehouse ? wrongDrawing(warehouse) : ["no_warehouse"];
+    if (why) put(this.parts.said, say(...why));
+    else if (warehouse) this.change(warehouse);
   }
 
   saveFile() {
-    const blob = new Blob([JSON.stringify(this.read(), null, 2)], { type: "application/json" });
+    const blob = new Blob([JSON.stringify(this.edits.now, null, 2)], { type: "application/json" });
     const anchor = document.createElement("a");
     anchor.href = URL.createObjectURL(blob);
     anchor.download = "warehouse.json";
@@ -78,69 +151,99 @@ export class Setup {
     setTimeout(() => URL.revokeObjectURL(anchor.href), 1_000);
   }
 
-  async loadFile(file) {
-    try {
-      const { size, side_length_cm, delivery = [0, 0], product = [], ...rest } = JSON.parse(await file.text());
-      await this.save({ ...rest, size, side_length_cm, delivery, product });
-    } catch {
-      // It is no JSON, or something else than this.
-      put(this.parts.said, `${file.name}: ${say("no_warehouse")}`);
-    }
+  async loadFile() {
+    const { loadFile } = this.parts;
+    const file = loadFile.files?.[0];
+    if (file) this.paste(readFile(await file.text()));
     // The same file can be chosen again.
-    this.parts.loadFile.value = "";
+    loadFile.value = "";
   }
 
-  /** The map as the document writes it, "X,Y,x,y" (M1). */
+  /** @param {string} text */
   pasteMap(text) {
-    const numbers = text.split(",").map((word) => (/^\s*\d+\s*$/.test(word) ? Number(word) : NaN));
-    if (numbers.length !== 4 || numbers.some(Number.isNaN)) return put(this.parts.said, say("map_string_how"));
-    const [width, height, x, y] = numbers;
-    this.save({ ...this.read(), size: [width, height], delivery: [x, y] });
+    const map = readMap(text);
+    if (map) this.paste({ ...(this.edits.now ?? FIRST), ...map });
+    else put(this.parts.said, say("map_string_how"));
   }
 
-  /** The goods as the document writes them, "v,x,y,s;...", s clockwise from left (M3). */
+  /** @param {string} text */
   pasteGoods(text) {
-    const product = [];
-    for (const part of text.split(";").filter((part) => part.trim())) {
-      const words = part.split(",").map((word) => word.trim());
-      const numbers = words.map((word) => (/^\d+$/.test(word) ? Number(word) : NaN));
-      const side = SIDES[numbers[3]];
-      if (words.length !== 4 || numbers.some(Number.isNaN) || !side) return put(this.parts.said, say("goods_string_how", part));
-      product.push({ id: numbers[0], square: [numbers[1], numbers[2]], side });
+    const goods = readGoods(text);
+    if ("wrong" in goods) put(this.parts.said, say("goods_string_how", goods.wrong));
+    else this.paste({ ...(this.edits.now ?? FIRST), ...goods });
+  }
+
+  /** Saves what is drawn, once nothing is wrong with it. */
+  async save() {
+    this.takeForm();
+    const why = this.check();
+    const { now } = this.edits;
+    if (why || !now) return put(this.parts.said, why ?? say("no_warehouse"));
+    this.isSaving = true;
+    const { refused, told = "" } = await this.link.ask("warehouse", null, JSON.stringify(now));
+    this.isSaving = false;
+    if (refused) put(this.parts.said, reason(refused));
+    else {
+      put(this.parts.said, told.split("; ").map(reason).join("; ") || say("saved"));
+      this.edits.saved(now);
+      this.isElsewhere = false;
     }
-    this.save({ ...this.read(), product });
+    this.kept(this.link.warehouse);
+    this.draw();
   }
 
-  /** Whether it is saved; what is wrong is told. */
-  async save(warehouse, undoable = true) {
-    const before = this.link.warehouse;
-    const why = this.wrong(warehouse);
-    const answer = why ? {} : await this.link.ask("warehouse", null, JSON.stringify(warehouse));
-    const refused = why ?? (answer.refused && reason(answer.refused));
-    const told = (answer.told ?? "").split("; ").map(reason).join("; ");
-    put(this.parts.said, refused ?? (told || say("saved")));
-    if (refused) return false;
-    if (undoable && before) this.past.push(before);
-    this.drawUndo();
-    this.dirty = false;
-    this.setWarehouse(warehouse);
-    return true;
+  /**
+   * The station keeps this warehouse.
+   *
+   * @param {Warehouse | null} warehouse
+   */
+  kept(warehouse) {
+    if (!warehouse || this.isSaving) return;
+    const before = this.edits.now;
+    this.isElsewhere = this.edits.kept(warehouse) || (this.isElsewhere && this.edits.unsaved > 0);
+    if (this.edits.now !== before) this.fill();
+    this.draw();
   }
 
-  /** Fills the form in, unless somebody is at work in it. */
-  setWarehouse(warehouse) {
-    if (this.dirty || !warehouse) return;
-    const { elements } = this.parts.form;
-    [elements.width.value, elements.height.value] = warehouse.size;
-    elements.side.value = warehouse.side_length_cm;
+  /** Fills the form in. */
+  fill() {
+    const { now } = this.edits;
+    if (!now) return;
+    const { width, height, side, delivery } = this.fields;
+    width.value = String(now.size[0]);
+    height.value = String(now.size[1]);
+    side.value = String(now.side_length_cm);
     this.corners();
-    elements.delivery.value = String(warehouse.delivery ?? [0, 0]);
-    this.parts.products.replaceChildren();
-    for (const product of warehouse.product ?? []) this.row(product);
+    delivery.value = String(now.delivery);
+    this.rows.fill(now.product ?? []);
+    this.drawn();
+    this.check();
+  }
+
+  /** What can be undone, and what is not saved. */
+  draw() {
+    const { parts, edits, link } = this;
+    /** @type {(button: HTMLButtonElement, key: string, what: Said | null) => void} */
+    const name = (button, key, what) => {
+      const words = say(key, what ? say(...what) : "");
+      button.disabled = !what || !link.mayDrive;
+      if (button.title === words) return;
+      button.title = words;
+      button.setAttribute("aria-label", words);
+    };
+    name(parts.undo, "undo_what", edits.undoes);
+    name(parts.redo, "redo_what", edits.redoes);
+    put(parts.undoes, edits.undoes ? say("undo_what", say(...edits.undoes)) : "");
+    const { unsaved } = edits;
+    const words = unsaved === 1 ? say("unsaved_one") : unsaved ? say("unsaved_many", unsaved) : "";
+    put(parts.unsaved, unsaved && this.isElsewhere ? `${words}; ${say("saved_elsewhere")}` : words);
+    parts.discard.hidden = !unsaved || !edits.safe || !link.mayDrive;
+    const { size: [x, y] = [0, 0], side_length_cm: side = 0 } = edits.now ?? {};
+    put(parts.floor, side ? `${decimal((x * side) / 100)} × ${decimal((y * side) / 100)} m` : "");
   }
 
   corners() {
-    const { width, height, delivery } = this.parts.form.elements;
+    const { width, height, delivery } = this.fields;
     const [x, y] = [Number(width.value), Number(height.value)];
     const chosen = delivery.selectedIndex;
     const corners = [[0, 0], [x, 0], [0, y], [x, y]];
@@ -148,74 +251,42 @@ export class Setup {
     delivery.selectedIndex = Math.max(chosen, 0);
   }
 
-  row({ id, name = "", square, side }) {
-    const line = document.createElement("tr");
-    const field = (type, value, key, size) => {
-      const input = document.createElement("input");
-      Object.assign(input, { type, value, name: key });
-      // What is left empty is no 0.
-      if (type === "number") Object.assign(input, { min: 0, required: true });
-      input.className = size;
-      input.dataset.label = { id: "number", name: "name", x: "column", y: "row" }[key];
-      return input;
-    };
-    const sides = document.createElement("select");
-    sides.name = "from";
-    sides.dataset.label = "reached_from";
-    for (const word of SIDES) sides.appendChild(new Option(word, word)).dataset.word = word;
-    sides.value = side;
-    const remove = document.createElement("button");
-    Object.assign(remove, { type: "button", textContent: "×" });
-    remove.dataset.title = "remove";
-    remove.onclick = () => {
-      line.remove();
-      this.dirty = true;
-      this.check();
-    };
-    const cells = [[field("number", id, "id", "short")], [field("text", name, "name", "")], [field("number", square[0], "x", "short"), field("number", square[1], "y", "short")], [sides], [remove]];
-    for (const parts of cells) {
-      const cell = document.createElement("td");
-      cell.append(...parts);
-      line.append(cell);
-    }
-    translate(line);
-    this.parts.products.append(line);
-  }
-
+  /**
+   * The warehouse that stands in the form.
+   *
+   * @returns {Warehouse}
+   */
   read() {
-    const { elements } = this.parts.form;
-    const product = [...this.parts.products.rows].map((line) => {
-      const value = (name) => line.querySelector(`[name=${name}]`).value;
-      const good = { id: Number(value("id")), square: [Number(value("x")), Number(value("y"))], side: value("from") };
-      return value("name") ? { ...good, name: value("name") } : good;
-    });
+    const { width, height, side, delivery } = this.fields;
+    const [x = 0, y = 0] = delivery.value.split(",").map(Number);
     return {
-      ...(this.link.warehouse ?? {}),
-      size: [Number(elements.width.value), Number(elements.height.value)],
-      side_length_cm: Number(elements.side.value),
-      delivery: elements.delivery.value.split(",").map(Number),
-      product,
+      ...(this.edits.now ?? {}),
+      size: [Number(width.value), Number(height.value)],
+      side_length_cm: Number(side.value),
+      delivery: [x, y],
+      product: this.rows.read(),
     };
   }
 
-  /** What is wrong with a warehouse, as a sentence; the station checks it, too. */
-  wrong({ size = [], side_length_cm: side, product }) {
-    const largest = Math.max(...size);
-    if (largest > LIMITS.squares) return say("size_limits", LIMITS.squares, largest);
-    if (side < LIMITS.leastSideCm || side > LIMITS.mostSideCm) return say("side_limits", LIMITS.leastSideCm, side, LIMITS.mostSideCm);
-    if (product.length > LIMITS.goods) return say("goods_limits", LIMITS.goods, product.length);
-    const ids = product.map(({ id }) => id);
-    const twice = ids.find((id, index) => ids.indexOf(id) !== index);
-    if (twice !== undefined) return say("duplicate", twice);
-    const outside = product.find(({ square: [x, y] }) => x < 0 || y < 0 || x >= size[0] || y >= size[1]);
-    return outside ? say("outside", outside.id) : null;
-  }
-
+  /** What is wrong, said and at each row; null if nothing is. */
   check() {
-    put(this.parts.said, this.wrong(this.read()) ?? "");
-  }
-
-  freeNumber() {
-    return Math.max(0, ...[...this.parts.products.rows].map((line) => Number(line.querySelector("[name=id]").value))) + 1;
+    const { form, said } = this.parts;
+    const all = this.read();
+    const goods = wrongGoods(all);
+    this.rows.mark(goods);
+    const first = wrongFloor(all) ?? goods.find(Boolean);
+    // An empty form is not wrong yet.
+    const isBegun = this.edits.now || this.fields.width.value;
+    const why = isBegun ? wrong(form.elements) ?? (first ? say(...first) : null) : null;
+    put(said, why ?? "");
+    this.draw();
+    return why;
   }
 }
+
+/**
+ * Whether it is a field of the warehouse; what is pasted or loaded replaces all of them.
+ *
+ * @param {EventTarget | null} target
+ */
+const isNamed = (target) => target instanceof Element && Boolean(target.getAttribute("name"));

@@ -5,7 +5,8 @@
 //   you <name> driver|viewer <release of the station's program>
 //   time <ms> [<here>]                the station's clock, in ms since 1970; first, and after each `here`, which it repeats
 //   warehouse <json>
-//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
+//   kept <where>
+//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] uses=<what>|- renews=0|1 [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
 //   from <robot> asked <who> <what>   a person here wants an action, stop, take, ask, keep, free or warehouse
 //   past <robot> <ms> <an event, a thought or what was asked so long ago>
@@ -17,6 +18,7 @@
 //   stop <robot> <number>             ahead of all else
 //   take <robot> <number>             the driver's seat, or asks whoever has it for it
 //   free | keep <robot> <number>      leaves it; does not leave it for whoever asks
+//   renew <robot> <number>            puts a simulated robot into the warehouse that is saved
 //   warehouse <number> <json>
 //   here <ms>                         once a second
 //
@@ -57,6 +59,12 @@ export class Link extends EventTarget {
     this.robots = new Map();
     /** @type {Warehouse | null} */
     this.warehouse = null;
+    /**
+     * Where the station keeps it.
+     *
+     * @type {string | null}
+     */
+    this.kept = null;
     /**
      * What the station calls this page.
      *
@@ -169,7 +177,7 @@ export class Link extends EventTarget {
   /**
    * Gives an order.
    *
-   * @param {"do" | "stop" | "take" | "free" | "keep" | "warehouse"} verb
+   * @param {"do" | "stop" | "take" | "free" | "keep" | "renew" | "warehouse"} verb
    * @param {string | null} robot one robot by its name or, with `null`, the station
    * @returns {Promise<Answer>}
    */
@@ -239,6 +247,8 @@ export class Link extends EventTarget {
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
+    } else if (word === "kept") {
+      this.kept = line.slice("kept ".length);
     } else if (word === "you") {
       // All that has happened is told after this.
       for (const robot of this.robots.values()) robot.forget();
@@ -274,6 +284,8 @@ export class Link extends EventTarget {
     robot.speaks = said.speaks === "1";
     robot.driver = said.driver === "-" ? null : said.driver ?? null;
     robot.asks = said.asks ?? null;
+    robot.uses = said.uses ?? "-";
+    robot.renews = said.renews === "1";
     // One that speaks only the document's language shows nothing that could be old.
     robot.heard = said.age_ms === undefined ? -Infinity : performance.now() - Number(said.age_ms);
   }

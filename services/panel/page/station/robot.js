@@ -15,6 +15,8 @@ import { Frames } from "./quantile.js";
  * @property {[number, number]} delivery
  * @property {Product[]} [product]
  * @property {{ curve?: "straight" | "left" | "right" | "s", length_cm?: number, radius_cm?: number }} [exit]
+ * @property {unknown} [floor] how bright it is
+ * @property {unknown} [obstacle] what stands on ways
  */
 /**
  * The fields of a robot's state, in its own words; what is not known is left out (bus/lines/src/extension/state.rs).
@@ -61,6 +63,9 @@ export class Robot {
     this.name = name;
     this.connected = false;
     this.speaks = false;
+    /** Which warehouse it uses, in the station's word, and whether it can be put into the saved one. */
+    this.uses = "-";
+    this.renews = false;
     /** @type {string | null} */
     this.driver = null;
     /**

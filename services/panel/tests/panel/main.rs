@@ -6,7 +6,14 @@ mod scene;
 mod stop;
 mod wheel;
 
-use scene::{Running, status};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use lager_lines::Name;
+use lager_orders::{Code, Reason};
+use lager_panel::World;
+use scene::{Page, Running, server, status};
 use tungstenite::Message;
 
 #[test]
@@ -139,9 +146,14 @@ fn on_this_machine_too_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
     assert_eq!(panel.page(&origin, "").err(), Some(403));
     let mut viewer = panel.page(&origin, cookie).unwrap();
     assert!(viewer.line("you ").unwrap().ends_with(" viewer"));
-    for (number, line) in ["do r1 1 0 resume 7", "take r1 2", "do r1 3 0 drive 2"]
-        .into_iter()
-        .enumerate()
+    for (number, line) in [
+        "do r1 1 0 resume 7",
+        "take r1 2",
+        "do r1 3 0 drive 2",
+        "renew r1 4",
+    ]
+    .into_iter()
+    .enumerate()
     {
         viewer.say(line);
         let answer = viewer.line("answer ").unwrap();
@@ -149,10 +161,61 @@ fn on_this_machine_too_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
         assert!(answer.starts_with(&wanted), "{answer}");
     }
     // The stop is no question of rank; this robot is just not there.
-    viewer.say("stop r1 4");
+    viewer.say("stop r1 5");
     let answer = viewer.line("answer ").unwrap();
     assert!(
-        answer.starts_with("answer 4 refused there is no robot r1"),
+        answer.starts_with("answer 5 refused there is no robot r1"),
         "{answer}"
     );
+}
+
+#[test]
+fn only_a_robot_of_this_station_is_put_into_another_world_and_first_it_is_stopped() {
+    let renewed = Arc::new(AtomicU32::new(0));
+    let counts = Arc::clone(&renewed);
+    let world = World::new(Name::new("r1").unwrap(), move || {
+        match counts.fetch_add(1, Ordering::SeqCst) {
+            0 => Ok(()),
+            _ => Err(Reason::new(Code::FloorUnfit, &[&"it has no room"])),
+        }
+    });
+    let panel = Running::with(server(None, None), Some(world));
+    let (robot, _other) = (panel.robot("r1"), panel.robot("r2"));
+    let mut anna = panel.own_page();
+    let mut bert = panel.own_page();
+    for name in ["r1", "r2"] {
+        anna.line(&format!("about {name} connected=1 speaks=1"))
+            .unwrap();
+    }
+    let ask = |page: &mut Page, line: &str| {
+        page.say(line);
+        page.line("answer ").unwrap()
+    };
+    let answer = ask(&mut anna, "renew r2 1");
+    assert!(
+        answer.starts_with("answer 1 refused r2 was not"),
+        "{answer}"
+    );
+    // While somebody drives it, only they may do that.
+    assert_eq!(ask(&mut bert, "take r1 2"), "answer 2 done");
+    let answer = ask(&mut anna, "renew r1 3");
+    assert!(answer.contains("drives the robot; ask first"), "{answer}");
+    assert_eq!(renewed.load(Ordering::SeqCst), 0);
+    assert_eq!(ask(&mut bert, "renew r1 4"), "answer 4 done");
+    assert_eq!(renewed.load(Ordering::SeqCst), 1);
+    let is_stopped = || {
+        robot
+            .0
+            .lock()
+            .unwrap()
+            .iter()
+            .any(|line| line.starts_with("stop "))
+    };
+    let end = Instant::now() + scene::WATCHDOG;
+    while !is_stopped() {
+        assert!(Instant::now() < end, "it was not stopped");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let answer = ask(&mut bert, "renew r1 5");
+    assert!(answer.contains("it has no room"), "{answer}");
 }

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use lager_lines::Name;
 use lager_lines::secret::Secrets;
 use lager_orders::Reason;
-use lager_panel::{Panel, Tokens};
+use lager_panel::{Panel, Tokens, World};
 use lager_station::{Handle, Listen, Server, ServerConfig};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::{Message, WebSocket};
@@ -51,10 +51,18 @@ impl Running {
     }
 
     pub(crate) fn of(server: Server) -> Self {
+        Self::with(server, None)
+    }
+
+    /// One that can put a simulated robot into another world.
+    pub(crate) fn with(server: Server, world: Option<World>) -> Self {
         let tokens = Tokens::random().unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let (handle, station) = (server.handle(), server.address().unwrap());
-        let panel = Panel::on(listener, tokens.clone(), handle.clone()).unwrap();
+        let mut panel = Panel::on(listener, tokens.clone(), handle.clone()).unwrap();
+        if let Some(world) = world {
+            panel = panel.with_world(world);
+        }
         let address = panel.address().unwrap();
         let end = Arc::new(AtomicBool::new(false));
         let (ends, too) = (Arc::clone(&end), Arc::clone(&end));

@@ -163,7 +163,7 @@ fn the_wheel_is_handed_over_when_its_driver_says_so() {
     bo.say("take r1 2");
     let asked = anna.line(&format!(
         "{} asks=panel-",
-        named.split(" age").next().unwrap()
+        named.split(" uses").next().unwrap()
     ));
     assert!(asked.is_some());
     cy.say("take r1 1");
@@ -180,7 +180,7 @@ fn the_wheel_is_handed_over_when_its_driver_says_so() {
     bo.say("take r1 3");
     anna.line(&format!(
         "{} asks=panel-",
-        named.split(" age").next().unwrap()
+        named.split(" uses").next().unwrap()
     ))
     .unwrap();
     anna.say("free r1 3");

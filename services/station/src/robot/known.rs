@@ -28,13 +28,19 @@ impl Robot {
         self.hello.as_ref().map(|hello| &hello.name)
     }
 
+    /// Whether it is here and was told all of a warehouse.
+    pub(crate) fn is_described(&self) -> bool {
+        let known = &self.known;
+        let is_told = known.side.is_some() && known.map.is_some() && known.products.is_some();
+        is_told && self.doing != Doing::Away
+    }
+
     /// How the warehouse that the robot was told differs from today's. `None` if they are equal, or
     /// if the robot was not told all of it.
     pub(crate) fn uses_other(&self) -> Option<Other> {
         let (side, map, products) = self.warehouse.as_ref()?;
         let known = &self.known;
-        let is_told = known.side.is_some() && known.map.is_some() && known.products.is_some();
-        if !is_told || self.doing == Doing::Away {
+        if !self.is_described() {
             return None;
         }
         if known.side != Some(*side) || known.map != Some(*map) {

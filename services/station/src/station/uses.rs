@@ -4,7 +4,10 @@
 //! floor does not change while a robot is up. So after a change of the goods the station ends the
 //! connection; the robot connects again and asks for the goods. A changed floor counts from the
 //! robot's next start. The station tells a simulated robot nothing, because the simulated world
-//! stays as it was at its start.
+//! stays as it was at its start, until somebody has it made anew ([`Handle::robots`] says of each
+//! robot which warehouse it uses).
+//!
+//! [`Handle::robots`]: crate::Handle::robots
 
 use lager_lines::Name;
 use lager_orders::{Code, Reason};
@@ -27,6 +30,30 @@ pub enum Uses {
     WorldBefore(Name),
 }
 
+impl Uses {
+    /// What `robot` does with the station's warehouse.
+    pub(crate) fn of(name: Name, robot: &Robot) -> Self {
+        match robot.uses_other() {
+            None => Self::This(name),
+            Some(_) if robot.shown().truth.is_some() => Self::WorldBefore(name),
+            Some(Other::Floor) => Self::FloorBefore(name),
+            Some(Other::Goods) if robot.driver().is_some() => Self::Driven(name),
+            Some(Other::Goods) => Self::Told(name),
+        }
+    }
+
+    /// Its word for programs.
+    pub const fn as_str(&self) -> &'static str {
+        match self {
+            Self::This(_) => "this",
+            Self::Told(_) => "told",
+            Self::Driven(_) => "driven",
+            Self::FloorBefore(_) => "floor_before",
+            Self::WorldBefore(_) => "world_before",
+        }
+    }
+}
+
 impl From<&Uses> for Reason {
     fn from(uses: &Uses) -> Self {
         let (code, robot) = match uses {
@@ -47,7 +74,7 @@ impl Station {
         let robots = self.robots.iter();
         let here = robots.filter(|(_, robot)| robot.doing() != Doing::Away);
         let uses: Vec<Uses> = here
-            .map(|(name, robot)| uses(name.clone(), robot))
+            .map(|(name, robot)| Uses::of(name.clone(), robot))
             .collect();
         for it in &uses {
             if let Uses::Told(name) = it
@@ -58,15 +85,5 @@ impl Station {
             }
         }
         uses
-    }
-}
-
-fn uses(name: Name, robot: &Robot) -> Uses {
-    match robot.uses_other() {
-        None => Uses::This(name),
-        Some(_) if robot.shown().truth.is_some() => Uses::WorldBefore(name),
-        Some(Other::Floor) => Uses::FloorBefore(name),
-        Some(Other::Goods) if robot.driver().is_some() => Uses::Driven(name),
-        Some(Other::Goods) => Uses::Told(name),
     }
 }

@@ -319,3 +319,17 @@ fn a_robot_that_held_begins_to_count_anew() {
         trial.now += 60 * S;
     }
 }
+
+#[test]
+fn in_another_world_everything_starts_at_once_and_as_for_the_first_time() {
+    let mut trial = Trial::whole(false, 5 * S);
+    assert_eq!(trial.take(Event::Renewed), [Step::StopAll(None)]);
+    // Two people have asked at once.
+    assert_eq!(trial.take(Event::Renewed), [Step::StopAll(None)]);
+    assert_eq!(trial.course.look(trial.now), [Step::Restore]);
+    let everything = Step::Attend(Sweep::Everything);
+    assert_eq!(trial.done(Event::Restored), [everything]);
+    assert_eq!(trial.done(Event::Swept), [Step::Start(Simulator, false)]);
+    let afresh = [Station, Comm, Bridge, Logic].map(|service| Step::Start(service, false));
+    assert_eq!(trial.done(Event::Joined), afresh);
+}

@@ -41,6 +41,14 @@ fn seconds(count: u64) -> Moment {
     }
 }
 
+/// Whether this puts the robot into autonomous mode, unless somebody has set its mode.
+fn begins(act: Option<Act>) -> bool {
+    match act {
+        Some(Act::Ask { ask, .. }) => ask.kind == AskKind::Begin,
+        _ => false,
+    }
+}
+
 #[test]
 fn what_is_delivered_is_counted_in_any_order_and_what_others_order_ends_no_mission() {
     let mut watch = simulated(Mission::of_station(&[3, 1, 3]));
@@ -74,16 +82,30 @@ fn a_person_who_has_set_the_mode_before_the_mission_began_keeps_it() {
     let health = ready.health.as_mut().expect("health");
     (health.mode, health.mode_chosen) = (Mode::Manual.into(), 0);
     let mut watch = simulated(Mission::of_robot(&[5], 40));
-    let begins = |act: Option<Act>| match act {
-        Some(Act::Ask { ask, .. }) => ask.kind == AskKind::Begin,
-        _ => false,
-    };
     assert!(begins(watch.step(seconds(1), &ready)));
     ready.health.as_mut().expect("health").mode_chosen = 1;
     for second in 2..100 {
         assert!(!begins(watch.step(seconds(second), &ready)));
     }
     assert_eq!(watch.mission().outcome(), None);
+}
+
+#[test]
+fn in_another_world_the_robot_begins_anew_and_the_mission_of_before_is_given_up() {
+    let mut mission = Mission::of_robot(&[3], 1);
+    mission.begun = true;
+    mission.leave_world("it is in another warehouse");
+    let mut watch = simulated(mission);
+    let mut ready = seen(Phase::WaitingForOrder, delivered(0, 0));
+    ready.health.as_mut().expect("health").mode_chosen = 0;
+    assert!(begins(watch.step(seconds(1), &ready)));
+    ready.health.as_mut().expect("health").mode_chosen = 1;
+    // Nothing of the mission of before is ordered.
+    for second in 2..100 {
+        assert!(watch.step(seconds(second), &ready).is_none());
+    }
+    let outcome = watch.mission().outcome();
+    assert_eq!(outcome, Some(Err("it is in another warehouse")));
 }
 
 #[test]

@@ -2,6 +2,8 @@
 //! or a process on it is silent. The robot comes up again by itself or ends with a sentence, and
 //! Ctrl-C always ends it.
 
+mod renewal;
+
 use std::fs::{self, File};
 use std::io::Read as _;
 use std::net::TcpListener;
