@@ -224,6 +224,7 @@ export class Link extends EventTarget {
       this.answer(first, rest);
     } else if (word === "time") {
       this.setTime(Number(first));
+      for (const robot of this.robots.values()) robot.pace.station(Number(first));
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
