@@ -4,6 +4,7 @@
 mod browser;
 mod driving;
 mod fleet;
+mod legible;
 mod manners;
 mod map;
 mod missions;

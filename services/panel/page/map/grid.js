@@ -8,7 +8,7 @@
 /**
  * What a pointer or a key means; `at` is in mm.
  *
- * @typedef {{ kind: "good" | "crossing" | "way", id: string, at: Point } | SquareSide} Target
+ * @typedef {{ kind: "good" | "stack" | "crossing" | "way", id: string, at: Point } | SquareSide} Target
  */
 /**
  * What there is to mean.
@@ -100,7 +100,7 @@ const wayAt = (words, side) => ({ kind: "way", id: words, at: way(words, side).m
  * @param {Pick<Parcel, "id" | "x" | "y">} parcel
  * @returns {Target}
  */
-const good = ({ id, x, y }) => ({ kind: "good", id, at: [x, y] });
+const good = ({ id, x, y }) => ({ kind: id.includes(" ") ? "stack" : "good", id, at: [x, y] });
 
 /**
  * @param {number} x

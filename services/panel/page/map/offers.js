@@ -6,6 +6,7 @@
 
 import { carries, turnOf, wasDelivered } from "./goods.js";
 import { ends, oneName } from "./grid.js";
+import { titleOf } from "../parts/parcel.js";
 import { crossing } from "../words/sentences.js";
 import { blockedFor } from "./ways.js";
 import { clock, say } from "../words/words.js";
@@ -27,12 +28,16 @@ import { clock, say } from "../words/words.js";
  * @param {(crossing: string[]) => unknown} page.stands says where the robot stands
  * @param {() => boolean} page.isPlaceWanted whether that is to be said
  * @param {(way: string) => unknown} page.obstacle puts an obstacle there or takes it away
+ * @param {(goods: string[], at: Point) => unknown} page.choose lets a person choose among goods that stand there
  * @param {(square: Point, side: Side) => unknown} page.goods puts goods at the side of a square
  * @param {() => number} page.now
  * @param {() => boolean} page.isPast whether the map shows the past; `robot` is the past one then
  * @returns {(target: Target | Tile | null) => Offer}
  */
-export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, goods, now, isPast }) {
+export function offers({ link, robot, fetch, choose, stands, isPlaceWanted, obstacle, goods, now, isPast }) {
+  /** @param {string} id */
+  const product = (id) => link.warehouse?.product?.find((product) => String(product.id) === id);
+
   /**
    * Goods are fetched; those that are not in their place, after a question.
    *
@@ -41,8 +46,8 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
    * @returns {Offer}
    */
   function good(id, hand) {
-    const { name, square = [] } = link.warehouse?.product?.find((product) => String(product.id) === id) ?? {};
-    const what = say("tip_good", name ? `${id} ${name}` : id, square.join(","));
+    const found = product(id);
+    const what = say("tip_good", found ? titleOf(found) : id, found?.square.join(","));
     const shown = robot();
     if (!shown) return { what, why: say("no_robot") };
     const turn = turnOf(shown, id);
@@ -58,6 +63,19 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
     }
     const after = shown.queue.filter(({ order }) => order !== shown.state.order).length;
     return { what, does: why ? undefined : after ? say("does_fetch_as", after + 1) : say("does_fetch"), why, act };
+  }
+
+  /**
+   * Of goods that stand as one, one is chosen.
+   *
+   * @param {Point} at
+   * @param {string} id
+   * @returns {Offer}
+   */
+  function stack(at, id) {
+    const ids = id.split(" ");
+    const goods = ids.flatMap((one) => product(one) ?? []);
+    return { what: say("tip_stack", goods[0]?.square.join(","), goods.map(titleOf).join(", ")), does: say("does_choose"), act: () => choose(ids, at) };
   }
 
   /**
@@ -118,6 +136,7 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, go
   function offer(target) {
     if (!target) return { why: say("nothing_here") };
     if (target.kind === "square") return place(target);
+    if (target.kind === "stack") return stack(target.at, target.id);
     if (target.kind === "good") return good(target.id, "hand" in target ? target.hand : undefined);
     return target.kind === "crossing" ? node(target.id) : way(target.id);
   }
