@@ -6,6 +6,7 @@ mod driving;
 mod editing;
 mod fleet;
 mod health;
+mod legible;
 mod manners;
 mod map;
 mod missions;

@@ -120,22 +120,33 @@ pub(crate) fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step(
         page.fill("#gains [name=d]", d);
         page.click_until("#gains [type=submit]", &are(p, d));
     }
+    // Who sets the same again, as after an answer that was long in coming, can put back what was before.
+    page.value("document.querySelector('#board-said').textContent = ''");
+    page.click_until(
+        "#gains [type=submit]",
+        "document.querySelector('#board-said').textContent === 'saved'",
+    );
     page.wait_for("#gains-back", "Put back 3 and 4");
     page.click_until("#gains-back", &are("3", "4"));
 
     // It stands still on its tape, so no sensor sees both, and the board says so for each sensor.
-    page.click("#calibrate");
-    page.wait_for("#calibration [aria-current]", "move it slowly");
-    page.wait_for("#calibration-said", "Calibrating");
+    page.click_until(
+        "#calibrate",
+        "document.querySelector('#calibration [aria-current]').textContent.includes('move it slowly') && \
+         document.querySelector('#calibration-said').textContent.startsWith('Calibrating')",
+    );
+    page.click_until(
+        "#calibrate",
+        "document.querySelector('#calibration-said').textContent.includes('of 11')",
+    );
     page.wait_until("document.querySelectorAll('#calibration-sensors .on').length > 0");
-    // Meanwhile the board reports each sensor's reading: higher over tape than over floor.
+    // Meanwhile the board has reported each sensor's reading: higher over tape than over floor.
     page.wait_until(
         "(() => { const read = (select) => [...document.querySelectorAll(`#calibration-sensors ${select}`)] \
            .map(({ textContent }) => Number(textContent)); \
          return read('.value').every((value) => value > 0) && \
            Math.min(...read('.on .value')) > Math.max(...read('.sensor:not(.on) .value')); })()",
     );
-    page.wait_for("#calibration-said", "of 11");
     page.wait_until("!document.querySelector('#calibrate').disabled");
 }
 

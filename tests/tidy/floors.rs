@@ -22,6 +22,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     ),
     // It does not know the content of requests.
     ("lager-door", &[]),
+    ("lager-battery", &[]),
     ("lager-ax12", &[]),
     ("lager-exde", &[]),
     (
@@ -77,6 +78,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     (
         "lager-monitor",
         &[
+            "lager-battery",
             "lager-home",
             "lager-orders",
             "lager-ports",
@@ -120,6 +122,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     (
         "lager-comm",
         &[
+            "lager-battery",
             "lager-floor",
             "lager-home",
             "lager-lines",
@@ -227,6 +230,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "lager-floor",
             "lager-bridge",
+            "lager-battery",
             "lager-comm",
             "lager-gateway",
             "lager-home",

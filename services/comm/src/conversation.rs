@@ -54,6 +54,7 @@ use core::ops::Range;
 use core::time::Duration;
 use std::collections::{HashMap, VecDeque};
 
+use lager_battery::{Battery, Pack};
 use lager_floor::ProductId;
 use lager_lines::Name;
 use lager_lines::conversation::{Held, RobotLine, StationLine, StationLineError};
@@ -66,7 +67,6 @@ use lager_orders::{Code, Mode, Moment, Reason};
 use lager_topics::{Event, Phase, Role, WarehouseMap};
 use lager_wire::OperatorCommand;
 
-use crate::battery::{Battery, Pack};
 use crate::effect::Effect;
 use crate::known::Known;
 use crate::lost::{LinkLost, Standing};

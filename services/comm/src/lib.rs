@@ -13,7 +13,6 @@
 #![forbid(unsafe_code)]
 
 mod asking;
-mod battery;
 mod conversation;
 mod effect;
 mod health;
@@ -29,7 +28,6 @@ mod shell;
 mod speech;
 mod telling;
 
-pub use battery::Pack;
 pub use conversation::Conversation;
 pub use effect::Effect;
 pub use known::{Machine, Senses};

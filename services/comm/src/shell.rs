@@ -10,6 +10,7 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
+use lager_battery::Pack;
 use lager_home::{Clock, Home, UnitName};
 use lager_lines::extension::Finding;
 use lager_lines::{MAX_LINE, Name, to_line};
@@ -28,7 +29,6 @@ use lager_topics::{
 use lager_wake::{Policy, Shutdown, Waiter, Watchdog};
 
 use crate::asking::Asking;
-use crate::battery::Pack;
 use crate::conversation::Conversation;
 use crate::effect::Effect;
 use crate::known::{Machine, Senses};

@@ -4,6 +4,7 @@
 //! Each kind of report replaces an earlier one that the station has not taken, so a slow station
 //! does not make a queue grow.
 
+use lager_battery::Battery;
 use lager_floor::{Node, Place, ProductId};
 use lager_lines::extension::{
     Block, Degrees, Event, Happened, Latency, Listed, Loads, Queued, Report, Servos, State, Thinks,
@@ -18,7 +19,6 @@ use lager_topics::{
 };
 use lager_wire::{Binary, LineBits, LineReading};
 
-use crate::battery::Battery;
 use crate::known::{Known, Senses, Stood};
 use crate::{health, pose};
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use lager_comm::{CommConfig, Pack};
+use lager_comm::CommConfig;
 use lager_lines::Name;
 use lager_supervisor::signals;
 use lager_wake::{GivenUp, Shutdown, Watchdog};
@@ -36,10 +36,7 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
         name,
         secret: args.secret.clone().or_else(|| joined.comm.secret.clone()),
         link_lost: joined.comm.link_lost,
-        pack: Pack {
-            cells: joined.logic.battery_cells,
-            low_decivolts: joined.logic.low_battery_decivolts,
-        },
+        pack: joined.pack(),
         resume: args.service.resume,
         findings: doctor::soon::findings,
     };

@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
+use lager_battery::Pack;
 use lager_home::UnitName;
 use lager_lines::check_names;
 use lager_orders::Pick;
@@ -267,6 +268,14 @@ impl Config {
             Body::Serial => Pick::Manual,
             Body::Sim | Body::Chip => Pick::Auto,
         })
+    }
+
+    /// The robot's battery.
+    pub const fn pack(&self) -> Pack {
+        Pack {
+            cells: self.logic.battery_cells,
+            low_decivolts: self.logic.low_battery_decivolts,
+        }
     }
 
     /// The navigator's part of the configuration.

@@ -39,6 +39,7 @@ pub fn run(config: &Config, args: &TopArgs, patience: &TimeLimit) -> Result<()> 
     let shown = tools.top(&TopConfig {
         filter: args.filter.clone(),
         once: args.once.then_some(measured),
+        pack: config.pack(),
     });
     match shown.and_then(|()| Ok(out.flush()?)) {
         Err(error) if error.is_closed_output() => Ok(()),

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { carries, turnOf } from "../page/map/goods.js";
+import { carries, stacks, turnOf } from "../page/map/goods.js";
 import { again, ends, meant, nearest, nextTo, oneName, way } from "../page/map/grid.js";
 import { free, meets } from "../page/map/labels.js";
 import { offers } from "../page/map/offers.js";
@@ -122,6 +122,16 @@ test("goods are in the claw from the pick-up until they are put down", () => {
   assert.equal(carries(null), null);
 });
 
+test("goods stand apart where each number can be read, and else as one; what stands at one side always does", () => {
+  const goods = [[1, "up"], [2, "down"], [3, "up"]].map(([id, side]) => ({ id, side, square: [4, 5] }));
+  const all = [...goods, { id: 4, side: "up", square: [0, 5] }];
+  const ids = (isLegible) => stacks(all, isLegible).map((stack) => stack.map(({ id }) => id));
+  assert.deepEqual(ids(() => true), [[1, 3], [2], [4]]);
+  assert.deepEqual(ids(() => false), [[1, 2, 3], [4]]);
+  // One number that cannot be read is enough.
+  assert.deepEqual(ids(({ id }) => id !== 2), [[1, 2, 3], [4]]);
+});
+
 test("the order under way is 0, and those that wait are counted without it", () => {
   const busy = robot({ product: "7", order: "1" }, { queue: [{ order: "1", product: "7" }, { order: "2", product: "9" }, { order: "3", product: "8" }] });
   assert.deepEqual(["7", "9", "8", "5"].map((product) => turnOf(busy, product)), [0, 1, 2, -1]);
@@ -170,6 +180,16 @@ test("a click fetches goods once, and nothing where it would be wrong", () => {
     assert.deepEqual([act, does], [undefined, undefined]);
     assert.ok(why);
   }
+});
+
+test("goods that stand as one are named, and one of them is chosen", () => {
+  const product = [...WAREHOUSE.product, { id: 9, square: [1, 0], side: "up" }];
+  const target = meant([600, 150], scene({ parcels: [{ ...PARCEL, id: "7 9" }] }));
+  const chosen = [];
+  const { offer } = offered(robot({}), { link: { warehouse: { ...WAREHOUSE, product }, mayDrive: true }, choose: (...what) => chosen.push(what) });
+  assert.equal(offer(target).what, "square 1,0: 7 Nails, 9");
+  offer(target).act();
+  assert.deepEqual(chosen, [[["7", "9"], [600, 150]]]);
 });
 
 test("goods that were delivered are only asked about", () => {

@@ -2,6 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { Pace } from "../page/station/pace.js";
 import { quantile } from "../page/station/quantile.js";
 import { fields, note, report } from "../page/station/report.js";
 import { Robot } from "../page/station/robot.js";
@@ -64,6 +65,42 @@ test("the last minute keeps what is known as numbers, and what is not as none", 
   for (let now = 0; now < 3_000; now++) report(robot, "state", [], now, now);
   assert.equal(robot.total, 3_001);
   assert.ok(robot.past.length >= 1_200 && robot.past.length <= 1_400, `${robot.past.length}`);
+});
+
+/** What a page keeps of a robot, whose clock goes `speed` times as fast as the station's: it stands still from `from` to `to`. */
+function stalled(speed, from, to) {
+  const robot = new Robot("r1");
+  for (let at = 0; at <= 10_000; at += 50) {
+    const now = at >= from && at < to ? to : at + 3;
+    // The station tells its time to a page that says that it is there.
+    if (at % 1_000 === 0 && now !== to) robot.pace.station(at);
+    report(robot, "state", [`time_ms=${70_000 + at * speed}`, `x_mm=${at}`, "y_mm=0"], now, now);
+    if (at === 5_500) report(robot, "event", ["stopped", "0", "0", "1", "1"], now, now);
+  }
+  return robot;
+}
+
+test("in a page that stood still the strips and the log have the times at which it was so", () => {
+  for (const speed of [1, 4, 0.5]) {
+    const robot = stalled(speed, 3_400, 7_900);
+    for (const { at, x } of robot.past) assert.ok(Math.abs(at - x) <= 300, `${at}, ${x}`);
+    assert.ok(Math.abs(robot.events[0].at - 5_500) <= 300, `${robot.events[0].at}`);
+  }
+  // What comes as usual counts as it comes.
+  assert.deepEqual(stalled(1, 0, 0).past.map(({ at, x }) => at - x), Array(201).fill(3));
+});
+
+test("a robot that was not heard, and a clock that was set, are not taken for a page that stood still", () => {
+  const pace = new Pace();
+  const hear = (ms, at) => (pace.robot(ms, at), pace.waited);
+  const told = (ms, at) => (pace.station(at), hear(ms, at));
+  for (let at = 0; at < 5_000; at += 1_000) told(at + 20, at);
+  // The station is heard, the robot is not; then it begins anew.
+  for (let at = 5_000; at < 9_000; at += 1_000) pace.station(at);
+  assert.deepEqual([hear(9_020, 9_000), told(9_060, 9_040), told(10_000, 10_000), told(10, 11_000), told(1_010, 12_000)], [0, 0, 0, 0, 0]);
+  // The station's clock is set back, and forth.
+  assert.deepEqual([told(2_010, 4_000), told(3_010, 5_000), told(4_010, 900_000), told(5_010, 901_000)], [0, 0, 0, 0]);
+  assert.equal(hear(null, 950_000), 0);
 });
 
 test("a stop's age is told, its moment is kept", () => {

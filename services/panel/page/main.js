@@ -28,6 +28,7 @@ import { OnMap } from "./setup/onmap.js";
 import { drawRemedy } from "./bar/remedy.js";
 import { Rename } from "./setup/rename.js";
 import { Save } from "./log/save.js";
+import { Stack } from "./map/stack.js";
 import { Setup } from "./setup/setup.js";
 import { Strips } from "./signals/strips.js";
 import { TimeLine } from "./time/line.js";
@@ -60,18 +61,23 @@ const meetWay = obstacles(link, { said: at("map-said"), undo: at("map-undo") }, 
  */
 const offered = (of) => offers({
   link, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
+  choose: (goods, at) => stack.open(goods, at, map.pixels(at), map.size),
   fetch: (product, hand = { beside: at("map-undo"), said: at("map-said") }) => missions.fetch(product, hand),
+  edited: () => setup.edits.now,
   setUp: (target) => rename.offers(target),
   ...of,
 });
+const tellOnMap = (words = "") => put(at("map-said"), words);
+const mapOffers = offered({ isPast: () => moment.isPast, isSetUp, robot: () => moment.shown(robot(), now())[0] });
 const map = new WarehouseMap(at("map"), {
-  words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), tell: (words = "") => put(at("map-said"), words),
+  words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), over: [at("asked"), at("moment")], tell: tellOnMap,
   tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
   hand: {
     tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: isSetUp, grip: (target) => (isSetUp() ? onMap.grip(target) : null),
-    offers: offered({ isPast: () => moment.isPast, isSetUp, robot: () => moment.shown(robot(), now())[0] }),
+    offers: mapOffers,
   },
 });
+const stack = new Stack(at("map-stack"), mapOffers, tellOnMap);
 const missions = new Missions(link, {
   fetch: at("fetch"), goods: at("goods"), tiles: at("tiles"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), plain: at("plain"),
   back: at("goods-back"), backSaid: at("goods-back-said"), backYes: at("goods-back-yes"), backNo: at("goods-back-no"), clear: at("clear"), undo: at("queue-undo"),

@@ -330,6 +330,8 @@ const COLUMNS: &[Column] = columns! {
     "right_duty_of_255": Number("right_duty"),
     "distance_cm": Number("distance_cm"),
     "battery_V": Tenths("battery_dv"),
+    "battery_percent": Number("battery_percent"),
+    "battery_left_s": Number("battery_left_s"),
     "path_p50_us": Latency(0),
     "path_p99_us": Latency(1),
     "heading_deg": Number("heading_deg"),
@@ -475,16 +477,18 @@ mod tests {
         let entry = Entry {
             at_ms: 1_795_449_546_007,
             robot: "r1",
-            line: "state x_mm=-4 node=1,0 servos=1,2,3,4,5,6,7,- battery_dv=114 sensor_lost=2 bus_lost=3",
+            line: "state x_mm=-4 node=1,0 servos=1,2,3,4,5,6,7,- battery_dv=114 battery_percent=62 sensor_lost=2 bus_lost=3",
         };
         let row = row(&entry, Some([123, 456]));
-        let known = "1795449546.007,-4,,,,,,11.4,123,456,,,,,\"1,0\",,,,,,,\"1,2,3,4,5,6,7,-\",,,5";
+        let known =
+            "1795449546.007,-4,,,,,,11.4,62,,123,456,,,,,\"1,0\",,,,,,,\"1,2,3,4,5,6,7,-\",,,5";
         assert_eq!(row, known);
         let outside: String = row.split('"').step_by(2).collect();
         assert_eq!(outside.matches(',').count(), COLUMNS.len());
         let object: Value = serde_json::from_str(&object(&entry, None)).unwrap();
         assert_eq!(object["at_ms"], 1_795_449_546_007_u64);
         assert_eq!(object["battery_V"], 11.4);
+        assert_eq!(object["battery_percent"], 62);
         assert_eq!(object["node"], "1,0");
         assert_eq!(object["path_p50_us"], Value::Null);
     }

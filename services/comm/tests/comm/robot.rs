@@ -2,7 +2,8 @@
 
 use core::time::Duration;
 
-use lager_comm::{Conversation, Effect, LinkLost, Pack};
+use lager_battery::Pack;
+use lager_comm::{Conversation, Effect, LinkLost};
 use lager_lines::conversation::RobotLine;
 use lager_lines::extension::{Hello, Report};
 use lager_lines::gag::Query;

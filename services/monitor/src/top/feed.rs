@@ -2,7 +2,7 @@
 //! and reads each.
 //!
 //! A row that is closed or filtered out has no subscription. Its writers and readers come from the
-//! bus's own lists. The head needs four states of the robot, and the stop word.
+//! bus's own lists. The head needs five states of the robot, and the stop word.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -15,7 +15,8 @@ use lager_ports::{
 use lager_sample::Topic;
 use lager_stop::{StopPage, StopWord};
 use lager_topics::{
-    LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, TopicVisitor, visit,
+    LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, SteeringState, TopicVisitor,
+    visit,
 };
 use lager_wake::Watchdog;
 
@@ -44,6 +45,7 @@ pub(crate) struct Feed<'a> {
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
     queue: Subscriber<MissionQueue>,
+    report: Subscriber<SteeringState>,
     path: Subscriber<LatencyPath>,
     command: Subscriber<LatencyCommand>,
     /// Real and robot time at the last look at the clock.
@@ -52,7 +54,7 @@ pub(crate) struct Feed<'a> {
 }
 
 impl<'a> Feed<'a> {
-    /// Opens the four states of the head.
+    /// Opens the five states of the head.
     ///
     /// # Errors
     /// There are too many observers, or a process of another build.
@@ -70,6 +72,7 @@ impl<'a> Feed<'a> {
                 health: bus.subscriber()?,
                 status: bus.subscriber()?,
                 queue: bus.subscriber()?,
+                report: bus.subscriber()?,
                 path: bus.subscriber()?,
                 command: bus.subscriber()?,
                 clocked: (Instant::now(), clock.now()),
@@ -161,6 +164,12 @@ impl<'a> Feed<'a> {
         }
         if let Some(queue) = self.queue.latest()? {
             model.head.queue = Some(*queue);
+        }
+        if let Some(report) = self.report.latest()? {
+            let head = &mut model.head;
+            head.battery
+                .read(self.clock.now(), report.battery_decivolts);
+            head.battery_decivolts = report.battery_decivolts;
         }
         if let Some(path) = self.path.latest()? {
             model.head.path.take(*path);

@@ -1,8 +1,9 @@
-//! The head of `lager top`: links, mode, stop, mission, load, and the latencies of the path. They
-//! come from the samples of four states and from the stop word.
+//! The head of `lager top`: links, mode, stop, mission, battery, load, and the latencies of the path. They
+//! come from the samples of five states and from the stop word.
 
 use std::time::Duration;
 
+use lager_battery::Battery;
 use lager_sample::Stamp;
 use lager_stop::Stop;
 use lager_topics::{
@@ -55,6 +56,9 @@ pub(crate) struct Head {
     heard_ns: [Option<u64>; 2],
     pub(crate) status: Option<NavigatorStatus>,
     pub(crate) queue: Option<OrderQueue>,
+    pub(crate) battery: Battery,
+    /// Its voltage in the last report of the steering board, in tenths of a volt; 0: not known.
+    pub(crate) battery_decivolts: u8,
     /// The latencies from frames to decisions, and from orders to the wire.
     pub(crate) path: Recent<PathLatency>,
     pub(crate) command: Recent<CommandLatency>,
@@ -151,6 +155,28 @@ impl Head {
         text
     }
 
+    /// The battery's voltage, while the board that measures it is heard.
+    fn volts(&self) -> Option<f64> {
+        let is_heard = self.health.is_some_and(|health| health.steering.up != 0);
+        (is_heard && self.battery_decivolts != 0).then(|| f64::from(self.battery_decivolts) / 10.0)
+    }
+
+    /// The battery in words: its charge, how long that lasts, and its voltage, as far as they are known.
+    pub(crate) fn charge(&self) -> Option<String> {
+        let volts = self.volts()?;
+        let Some(percent) = self.battery.percent() else {
+            return Some(format!("{volts:.1} V"));
+        };
+        let left = self
+            .battery
+            .left()
+            .map(|left| format!("for {}, ", span(left)));
+        Some(format!(
+            "{percent} %, {}{volts:.1} V",
+            left.unwrap_or_default()
+        ))
+    }
+
     /// The same for programs.
     pub(crate) fn as_json(&self, now_ns: u64) -> Value {
         let link = |place: usize| {
@@ -181,7 +207,11 @@ impl Head {
                 "service": failing.who, "pid": failing.pid, "state": state, "silent_ns": silent,
             })
         });
+        let volts = self.volts();
+        let known = volts.and(Some(&self.battery));
         json!({
+            "battery_V": volts, "battery_percent": known.and_then(Battery::percent),
+            "battery_left_s": known.and_then(Battery::left).map(|left| left.as_secs()),
             "failing": failing.collect::<Vec<_>>(),
             "robot": self.robot, "mode": self.mode(), "stop": self.stopped(now_ns),
             "sensor": link(0), "steering": link(1), "mission": self.mission(),
@@ -324,6 +354,8 @@ pub(crate) fn span(span: Duration) -> String {
 
 #[cfg(test)]
 mod tests {
+    use lager_battery::Pack;
+
     use super::*;
 
     #[test]
@@ -339,6 +371,37 @@ mod tests {
         head.take_health(health, 1_500_000_000);
         assert!(head.link(0, 1_500_000_000).starts_with("up      0 ms old"));
         assert!(head.link(1, 1_500_000_000).starts_with("DOWN       - old"));
+    }
+
+    #[test]
+    fn the_battery_is_told_while_its_board_is_heard() {
+        let pack = Pack {
+            cells: 3,
+            low_decivolts: 99,
+        };
+        let mut head = Head {
+            battery: Battery::new(pack),
+            ..Head::default()
+        };
+        let mut health = Health::default();
+        health.steering.up = 1;
+        head.take_health(health, 0);
+        assert_eq!(head.charge(), None);
+        head.battery.read(Duration::ZERO, 114);
+        head.battery_decivolts = 114;
+        assert_eq!(head.charge().as_deref(), Some("50 %, 11.4 V"));
+        let json = head.as_json(0);
+        assert_eq!(
+            (&json["battery_V"], &json["battery_percent"]),
+            (&json!(11.4), &json!(50))
+        );
+        // Of a battery that is not of such cells only the voltage is known.
+        head.battery = Battery::default();
+        assert_eq!(head.charge().as_deref(), Some("11.4 V"));
+        health.steering.up = 0;
+        head.take_health(health, 0);
+        assert_eq!(head.charge(), None);
+        assert_eq!(head.as_json(0)["battery_percent"], Value::Null);
     }
 
     #[test]

@@ -22,6 +22,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
+use lager_battery::{Battery, Pack};
 use lager_home::Clock;
 use lager_sample::{Description, Stamp, Topic};
 use lager_topics::{LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus};
@@ -50,6 +51,8 @@ pub struct TopConfig {
     pub filter: String,
     /// Measure for this time, print one picture, and end.
     pub once: Option<Duration>,
+    /// The robot's battery.
+    pub pack: Pack,
 }
 
 impl<W: Write> Tools<'_, W> {
@@ -60,6 +63,7 @@ impl<W: Write> Tools<'_, W> {
     pub fn top(&mut self, config: &TopConfig) -> Result<(), ToolError> {
         let mut model = Model::new(self.bus.unit().as_str());
         model.view.filter.clone_from(&config.filter);
+        model.head.battery = Battery::new(config.pack);
         urgency::wake_with_others(POLL);
         let mut feed = Feed::new(self.bus, self.watchdog)?;
         feed.look(&mut model)?;

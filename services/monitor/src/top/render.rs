@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  robot, mode, how many topics are in trouble, clock, load
-//!  stop, both links, mission                    (four lines)
+//!  stop, both links, mission, battery           (four or five lines)
 //!  the way of frames to logic's decision, or with room each stage
 //!  the table: the most telling columns first, the others where there is room
 //!  the keys, or the filter while it is typed
@@ -170,6 +170,9 @@ fn head(model: &Model, page: &mut Page<'_>) {
     }
     let mission = known(head.status.is_some(), head.mission());
     page.put(&format!("mission   {mission}"), plain());
+    if let Some(charge) = head.charge() {
+        page.put(&format!("battery   {charge}"), plain());
+    }
     path(model, page);
 }
 

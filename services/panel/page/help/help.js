@@ -20,7 +20,7 @@ const PAGE_KEYS = [["Esc", "key_stop"], ["Space", "key_space"], ["?", "key_help"
  *
  * @type {[string, string][]}
  */
-const VIEW_KEYS = [["/", "key_search"], ["K J", "key_events"], ["\u2190 \u2192 Home End", "key_time"], ["Alt \u2191 \u2193", "key_queue"], ["Delete", "key_queue_out"]];
+const VIEW_KEYS = [["/", "key_search"], ["K J", "key_events"], ["\u2190 \u2192 Home End", "key_time"], ["Alt \u2191 \u2193", "key_queue"], ["Delete", "key_queue_out"], ["Ctrl Z", "key_undo"], ["Ctrl Y", "key_redo"], ["Ctrl S", "key_save"]];
 /** @type {[string, string][]} */
 const MAP_KEYS = [["\u2190 \u2192 \u2191 \u2193", "key_map"], ["Enter", "key_map_enter"], ["Shift \u2190 \u2192", "key_map_move"], ["+ \u2212", "key_map_zoom"]];
 /** The colours that have a meaning. */

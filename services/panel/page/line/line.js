@@ -55,7 +55,7 @@ export class Line {
   async calibrate() {
     const { calibrate, steps, calibrationSaid } = this.parts;
     /** @param {number} step */
-    const at = (step) => [...steps.children].forEach((line, index) => line.toggleAttribute("aria-current", index === step));
+    const at = (step) => [...steps.children].forEach((line, index) => (line.ariaCurrent = index === step ? "step" : null));
     const robot = this.robot();
     if (robot) robot.sensors = null;
     calibrate.disabled = true;
@@ -107,7 +107,8 @@ export class Line {
     const answer = robot ? await this.link.act(robot, `gains ${p} ${d}`) : { refused: say("no_robot") };
     put(this.parts.said, answer.refused ? reason(answer.refused) : say("saved"));
     if (answer.refused) return;
-    this.gainsBefore = before;
+    // What is set again leaves what can be put back.
+    if (String(before) !== String([p, d])) this.gainsBefore = before;
     // Somebody may be typing others by now.
     if (this.p.value === p && this.d.value === d) this.gainsTyped = false;
   }

@@ -151,8 +151,8 @@ export class Aim {
   click(target, time) {
     const id = target ? `${target.kind} ${target.id}` : "";
     if (this.clicked.id === id && time - this.clicked.at < TWICE_MS) return;
-    // One that did nothing leaves the next one free.
-    this.clicked = { id: this.act(target) ? id : null, at: time };
+    // One that did nothing, or only lists goods, leaves the next one free.
+    this.clicked = { id: this.act(target) && target?.kind !== "stack" ? id : null, at: time };
   }
 
   /**

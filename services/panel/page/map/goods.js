@@ -6,6 +6,7 @@
 import { INSIDE } from "./floor.js";
 import { SIDES } from "./grid.js";
 import { meets } from "./labels.js";
+import { titleOf } from "../parts/parcel.js";
 import { make, set } from "../parts/svg.js";
 import { put, say } from "../words/words.js";
 
@@ -13,8 +14,9 @@ import { put, say } from "../words/words.js";
 const SIZE = 112;
 const SIZE_PX = 20;
 const PART = 0.7;
-/** From this size on, in pixels, a parcel has its number. */
+/** From this size on, in pixels, a parcel has its number; where parcels share a square, from this size of its digits on. */
 const NUMBER_PX = 12;
+const DIGIT_PX = 9;
 /** From this size of a square on, in pixels, goods have their names. */
 const NAME_PX = 80;
 /**
@@ -26,11 +28,12 @@ const BESIDE = 104;
 /** A robot that puts its goods down or comes back has them no more. */
 const HANDS_EMPTY = ["backing_off", "turning_round", "returning"];
 
+/** @typedef {[Product, ...Product[]]} Stack Goods that are drawn as one parcel. */
 /**
  * A parcel on the map: where it is and how large, in mm, and what it is drawn with.
  *
  * @typedef {object} Parcel
- * @property {string} id
+ * @property {string} id the number of its goods, of a stack all of them as words
  * @property {string} [name]
  * @property {number} x
  * @property {number} y
@@ -40,6 +43,7 @@ const HANDS_EMPTY = ["backing_off", "turning_round", "returning"];
  * @property {[number, number]} square
  * @property {boolean} isShared whether others are in the same square
  * @property {SVGElement} box
+ * @property {SVGElement} number
  * @property {SVGElement} turn
  * @property {SVGElement} turnNumber
  * @property {SVGElement} why
@@ -93,7 +97,12 @@ export class Goods {
     this.names.replaceChildren();
     const products = warehouse?.product ?? [];
     const size = Math.min(Math.max(SIZE, SIZE_PX * px), side * PART);
-    this.parcels = products.map((product) => this.parcel(product, products, side, size, px));
+    const small = shared(size, side, px);
+    const all = stacks(products, ({ id }) => small >= NUMBER_PX * px && letter(String(id), small, px) >= DIGIT_PX * px);
+    this.parcels = all.map((stack) => {
+      const isShared = all.filter(([{ square }]) => String(square) === String(stack[0].square)).length > 1;
+      return this.parcel(stack, isShared, side, isShared ? small : size, px);
+    });
     this.hasNumbers = size >= NUMBER_PX * px;
     this.hasWords = side / px >= NAME_PX;
     this.taken = [];
@@ -101,33 +110,43 @@ export class Goods {
   }
 
   /**
-   * @param {Product} product
-   * @param {Product[]} products
+   * @param {Stack} stack
+   * @param {boolean} isShared
    * @param {number} side
    * @param {number} size
    * @param {number} px
    * @returns {Parcel}
    */
-  parcel({ id, name, square, side: from }, products, side, size, px) {
-    const [dx, dy] = SIDES[from];
-    const isShared = products.filter((other) => String(other.square) === String(square)).length > 1;
+  parcel(stack, isShared, side, size, px) {
+    const [{ square }] = stack;
+    const ways = new Set(stack.map(({ side }) => side));
+    // One that is reached from several sides stands between them.
+    const [dx, dy] = ways.size > 1 ? [0, 0] : SIDES[stack[0].side];
     const middle = side / 2;
-    if (isShared) size = shared(size, side, px);
     const depth = isShared ? Math.min(BESIDE + size / 2, middle - size) : Math.min(CLEAR + size / 2, middle);
     const [x, y] = [(square[0] + 0.5) * side + dx * (middle - depth), (square[1] + 0.5) * side + dy * (middle - depth)];
+    const id = stack.map(({ id }) => id).join(" ");
     const box = make("g", { class: "good", "data-product": id, transform: `translate(${x} ${-y})` }, this.group);
-    make("title", {}, box, name ? `${id} ${name}` : String(id));
+    make("title", {}, box, stack.map(titleOf).join("\n"));
     // The mark on the tape at which the robot turns in reaches to its goods.
-    make("path", { class: "mark", d: `M${dx * depth} ${-dy * depth}L${(dx * size) / 2} ${(-dy * size) / 2}` }, box);
+    const reach = ways.size > 1 ? middle : depth;
+    for (const way of ways) {
+      const [wx, wy] = SIDES[way];
+      make("path", { class: "mark", d: `M${wx * reach} ${-wy * reach}L${(wx * size) / 2} ${(-wy * size) / 2}` }, box);
+    }
+    const behind = Math.min(2.5 * px, size / 6) - size / 2;
+    if (stack.length > 1) make("rect", { x: behind, y: -behind - size, width: size, height: size, rx: size / 12 }, box);
     make("rect", { x: -size / 2, y: -size / 2, width: size, height: size, rx: size / 12 }, box);
     make("path", { class: "lid", d: `M${-size / 6} ${-size / 2}v${size / 5}h${size / 3}v${-size / 5}` }, box);
-    const letter = Math.min(Math.max(11 * px, size * 0.45), (size * 0.9) / (0.6 * String(id).length));
-    make("text", { class: "number", y: letter * 0.36, "font-size": letter }, box, size / px < NUMBER_PX ? "" : String(id));
+    const words = stack.length > 1 ? many(stack.length) : id;
+    const high = letter(words, size, px);
+    const number = make("text", { class: "number", y: high * 0.36, "font-size": high }, box, size / px < NUMBER_PX ? "" : words);
     const turn = make("g", { class: "turn", transform: `translate(${size / 2} ${-size / 2})` }, box);
     make("circle", {}, turn);
     const turnNumber = make("text", { y: 4 * px }, turn);
     const why = make("text", { class: "why", y: size / 2 + 14 * px }, box);
-    return { id: String(id), name, x, y, size, dx, dy, square, isShared, box, turn, turnNumber, why };
+    const name = stack.length > 1 ? id.replaceAll(" ", " \u00b7 ") : stack[0].name;
+    return { id, name, x, y, size, dx, dy, square, isShared, box, number, turn, turnNumber, why };
   }
 
   /**
@@ -159,17 +178,22 @@ export class Goods {
    */
   mark(robot) {
     const noWay = ["no_way", "unreachable"].includes(robot.state.failure ?? "");
-    for (const { id, box, turn, turnNumber, why } of this.parcels) {
-      const order = turnOf(robot, id);
-      const [isWanted, isQueued, isGone] = [order === 0, order > 0, robot.gone.has(id)];
-      const isOutOfReach = isWanted ? noWay : isQueued && robot.jobs.putOff.get(id) === "order_put_off";
+    for (const { id, box, number, turn, turnNumber, why } of this.parcels) {
+      const ids = id.split(" ");
+      const turns = ids.map((one) => turnOf(robot, one)).filter((turn) => turn >= 0);
+      const order = Math.min(...turns.filter((turn) => turn > 0));
+      const here = ids.filter((one) => !robot.gone.has(one));
+      const [isWanted, isQueued, isGone] = [turns.includes(0), Number.isFinite(order), !here.length];
+      const isOutOfReach = isWanted ? noWay : isQueued && ids.some((one) => robot.jobs.putOff.get(one) === "order_put_off");
+      // Of a stack the number of those that are in their place.
+      if (ids.length > 1 && number.textContent) put(number, many(here.length || ids.length));
       const words = ["good", isWanted && "wanted", isQueued && "queued", isGone && "gone", isOutOfReach && "out-of-reach"];
       set(box, "class", words.filter(Boolean).join(" "));
       turn.toggleAttribute("hidden", !isQueued || !this.hasNumbers);
       put(turnNumber, isQueued ? String(order) : "");
       // In a dense map the dashed parcel says enough.
       const isAway = isGone && !isWanted && this.hasWords;
-      const said = isOutOfReach ? say("no_way") : isAway ? say(wasDelivered(robot, id) ? "delivered" : "away") : "";
+      const said = isOutOfReach ? say("no_way") : isAway ? say(ids.every((one) => wasDelivered(robot, one)) ? "delivered" : "away") : "";
       put(why, said);
       // It stands in the name's place.
       this.names.querySelector(`[data-name="${id}"]`)?.toggleAttribute("hidden", said !== "");
@@ -186,6 +210,41 @@ export class Goods {
     const box = ({ x, y, size }) => [x - size / 2, -y - size / 2, x + size / 2, -y + size / 2];
     return [...this.parcels.map(box), ...this.taken];
   }
+}
+
+/** @param {number} count */
+const many = (count) => `\u00d7${count}`;
+
+/**
+ * How high the letters on a parcel are, so that they fit.
+ *
+ * @param {string} words
+ * @param {number} size
+ * @param {number} px
+ */
+const letter = (words, size, px) => Math.min(Math.max(11 * px, size * 0.45), (size * 0.9) / (0.6 * words.length));
+
+/**
+ * Goods, each for itself or with those that are drawn as one with it: what stands at one side of a square, and all of
+ * a square that has no room for a number that can be read on each.
+ *
+ * @param {Product[]} products
+ * @param {(product: Product) => boolean} isLegible whether its number is, in a square that it shares
+ * @returns {Stack[]}
+ */
+export function stacks(products, isLegible) {
+  /** @type {(all: Product[], key: (one: Product) => string) => Stack[]} */
+  const groups = (all, key) => {
+    /** @type {Map<string, Stack>} */
+    const found = new Map();
+    for (const one of all) {
+      const group = found.get(key(one));
+      if (group) group.push(one);
+      else found.set(key(one), [one]);
+    }
+    return [...found.values()];
+  };
+  return groups(products, ({ square }) => String(square)).flatMap((all) => (all.every(isLegible) ? groups(all, ({ side }) => side) : [all]));
 }
 
 /**

@@ -10,7 +10,7 @@ import { BEYOND } from "./floor.js";
 /**
  * What a pointer or a key means; `at` is in mm. An edge of the floor is its handle.
  *
- * @typedef {{ kind: "good" | "crossing" | "way" | "corner" | "edge", id: string, at: Point } | SquareSide} Target
+ * @typedef {{ kind: "good" | "stack" | "crossing" | "way" | "corner" | "edge", id: string, at: Point } | SquareSide} Target
  */
 /**
  * What there is to mean.
@@ -104,7 +104,7 @@ const wayAt = (words, side) => ({ kind: "way", id: words, at: way(words, side).m
  * @param {Pick<Parcel, "id" | "x" | "y">} parcel
  * @returns {Target}
  */
-const good = ({ id, x, y }) => ({ kind: "good", id, at: [x, y] });
+const good = ({ id, x, y }) => ({ kind: id.includes(" ") ? "stack" : "good", id, at: [x, y] });
 
 /**
  * The corners of a floor, and the handles by which it is made larger or smaller.

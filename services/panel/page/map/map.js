@@ -29,6 +29,8 @@ const BELOW_PX = 64;
 /** While the warehouse is set up there are buttons above it, too, and its lengths stand beside it. */
 const MARGIN_SET_UP_PX = 72;
 const ABOVE_SET_UP_PX = 140;
+/** So far below what stands over the map is said what belongs to nothing on it, in pixels. */
+const NOWHERE_PX = 24;
 /** The numbers of the columns stand below the floor. */
 const NUMBERS_PX = 16;
 /** How far in and out one can zoom: the width of the view in mm. */
@@ -48,16 +50,18 @@ export class WarehouseMap {
    * @param {HTMLElement} parts.words
    * @param {HTMLElement} parts.scaleBar
    * @param {HTMLDetailsElement} parts.legend
+   * @param {HTMLElement[]} parts.over what stands over the map's upper edge, if it is not hidden
    * @param {Record<"zoomIn" | "zoomOut" | "fit" | "follow", HTMLElement>} parts.tools
    * @param {{ tip: HTMLElement, offers: (target: Target | null) => Offer, grip: (target: Target | null) => Grip | null, isArmed: () => boolean, isPlacing: () => boolean }} parts.hand
    *   is what `Aim` takes and `isPlacing`, whether the warehouse is set up
    * @param {(words?: string) => void} parts.tell says something below the map
    */
-  constructor(svg, { words, scaleBar, legend, tools, hand, tell }) {
+  constructor(svg, { words, scaleBar, legend, over, tools, hand, tell }) {
     this.svg = svg;
     this.words = words;
     this.scaleBar = scaleBar;
     this.legend = legend;
+    this.over = over;
     this.tell = tell;
     this.isPlacing = hand.isPlacing;
     this.followButton = tools.follow;
@@ -270,13 +274,15 @@ export class WarehouseMap {
     const words = [chip, look !== "lost" && robot?.state.phase && !isKnown && say("place_unknown")].filter(Boolean).join(", ");
     const [left, top, right, bottom] = this.seen;
     // Below stand the map's own words and buttons.
+    const above = Math.max(0, ...this.over.filter(({ hidden }) => !hidden).map(({ offsetTop, offsetHeight }) => offsetTop + offsetHeight));
     /** @type {Box} */
-    const view = [left, top, right, bottom - BELOW_PX * px];
+    const view = [left, top + above * px, right, bottom - BELOW_PX * px];
+    const nowhere = top + (Math.max(ABOVE_PX, above) + NOWHERE_PX) * px;
     /** @type {Said[]} */
     const labels = [];
     /** @type {(box: Box | null, key: string, style: string, words: string) => void} */
     const about = (box, key, style, words) => {
-      const [left, top, right, bottom] = box ?? [view[0], view[1], view[2], view[1]];
+      const [left, top, right, bottom] = box ?? [view[0], nowhere, view[2], nowhere];
       labels.push({ key, style, words, at: [(left + right) / 2, (top + bottom) / 2], reach: [(right - left) / 2, (bottom - top) / 2] });
     };
     if (words) about(this.body.box, "chip", "chip", words);

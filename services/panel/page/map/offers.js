@@ -1,11 +1,12 @@
 // What the things on the map are, and what a click on one does now: the one place for tip and click.
 
 /** @import { Link } from "../station/link.js" */
-/** @import { Robot } from "../station/robot.js" */
-/** @import { Target } from "./grid.js" */
+/** @import { Robot, Warehouse } from "../station/robot.js" */
+/** @import { Point, Target } from "./grid.js" */
 
 import { carries, turnOf, wasDelivered } from "./goods.js";
 import { ends, oneName } from "./grid.js";
+import { titleOf } from "../parts/parcel.js";
 import { crossing } from "../words/sentences.js";
 import { blockedFor } from "./ways.js";
 import { clock, say } from "../words/words.js";
@@ -28,12 +29,17 @@ import { clock, say } from "../words/words.js";
  * @param {() => boolean} page.isPlaceWanted whether that is to be said
  * @param {(way: string) => unknown} page.obstacle puts an obstacle there or takes it away
  * @param {() => boolean} page.isSetUp whether the map shows the warehouse that is set up
+ * @param {() => Warehouse | null} page.edited that warehouse
  * @param {(target: Target) => Offer} page.setUp what a thing is and does then
+ * @param {(goods: string[], at: Point) => unknown} page.choose lets a person choose among goods that stand there
  * @param {() => number} page.now
  * @param {() => boolean} page.isPast whether the map shows the past; `robot` is the past one then
  * @returns {(target: Target | Tile | null) => Offer}
  */
-export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, isSetUp, setUp, now, isPast }) {
+export function offers({ link, robot, fetch, choose, stands, isPlaceWanted, obstacle, isSetUp, edited, setUp, now, isPast }) {
+  /** @param {string} id */
+  const product = (id) => (isSetUp() ? edited() : link.warehouse)?.product?.find((product) => String(product.id) === id);
+
   /**
    * Goods are fetched; those that are not in their place, after a question.
    *
@@ -42,8 +48,8 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, is
    * @returns {Offer}
    */
   function good(id, hand) {
-    const { name, square = [] } = link.warehouse?.product?.find((product) => String(product.id) === id) ?? {};
-    const what = say("tip_good", name ? `${id} ${name}` : id, square.join(","));
+    const found = product(id);
+    const what = say("tip_good", found ? titleOf(found) : id, found?.square.join(","));
     const shown = robot();
     if (!shown) return { what, why: say("no_robot") };
     const turn = turnOf(shown, id);
@@ -59,6 +65,19 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, is
     }
     const after = shown.queue.filter(({ order }) => order !== shown.state.order).length;
     return { what, does: why ? undefined : after ? say("does_fetch_as", after + 1) : say("does_fetch"), why, act };
+  }
+
+  /**
+   * Of goods that stand as one, one is chosen.
+   *
+   * @param {Point} at
+   * @param {string} id
+   * @returns {Offer}
+   */
+  function stack(at, id) {
+    const ids = id.split(" ");
+    const goods = ids.flatMap((one) => product(one) ?? []);
+    return { what: say("tip_stack", goods[0]?.square.join(","), goods.map(titleOf).join(", ")), does: say("does_choose"), act: () => choose(ids, at) };
   }
 
   /**
@@ -110,13 +129,14 @@ export function offers({ link, robot, fetch, stands, isPlaceWanted, obstacle, is
    */
   function offer(target) {
     if (!target) return { why: say("nothing_here") };
+    if (target.kind === "stack") return stack(target.at, target.id);
     if (target.kind === "good") return good(target.id, "hand" in target ? target.hand : undefined);
     return target.kind === "crossing" ? node(target.id) : way(target.id);
   }
 
   return (target) => {
     // While the warehouse is set up or the map shows the past, nothing on it is ordered.
-    if (isSetUp()) return target && !("hand" in target) ? setUp(target) : { why: say("set_up_how") };
+    if (isSetUp()) return !target || "hand" in target ? { why: say("set_up_how") } : target.kind === "stack" ? offer(target) : setUp(target);
     return isPast() ? { what: offer(target).what, why: say("past_orders") } : offer(target);
   };
 }

@@ -7,6 +7,7 @@
 /** @import { Known } from "./legs.js" */
 
 import { turnOf, wasDelivered } from "../map/goods.js";
+import { titleOf } from "../parts/parcel.js";
 import { PLAIN, reason, sentence } from "../words/sentences.js";
 import { clock, put, say } from "../words/words.js";
 import { crossingsTo, learn, left, waits } from "./legs.js";
@@ -239,7 +240,7 @@ export class Missions {
     this.learned = null;
     const goods = warehouse?.product ?? [];
     this.goods = new Map(goods.map((one) => [String(one.id), one]));
-    this.names = new Map(goods.map(({ id, name = "" }) => [String(id), `${id} ${name}`.trim()]));
+    this.names = new Map(goods.map((one) => [String(one.id), titleOf(one)]));
     this.tiles.setGoods(goods);
     this.past.setNames(this.names);
   }

@@ -5,7 +5,7 @@
 /** @import { Product, Robot } from "../station/robot.js" */
 
 import { turnOf } from "../map/goods.js";
-import { parcel } from "../parts/parcel.js";
+import { parcel, titleOf } from "../parts/parcel.js";
 import { isText } from "../bar/stop.js";
 import { put, say } from "../words/words.js";
 import { matches } from "./reorder.js";
@@ -117,7 +117,7 @@ export class Tiles {
     for (const [id, button] of this.buttons) button.hidden = !found.some((one) => String(one.id) === id);
     if (!value.trim()) return;
     const [one] = found;
-    put(this.said, one ? (found.length > 1 ? "" : say("search_one", title(one))) : say("search_none"));
+    put(this.said, one ? (found.length > 1 ? "" : say("search_one", titleOf(one))) : say("search_none"));
   }
 
   /** Orders what is meant, if that is one. */
@@ -127,7 +127,7 @@ export class Tiles {
     const text = field.value.trim();
     if (!text) return field.focus();
     const found = matches(this.goods, text);
-    const some = found.slice(0, SOME).map(title).join(", ");
+    const some = found.slice(0, SOME).map(titleOf).join(", ");
     if (found.length > 1) return put(said, say("search_many", found.length > SOME ? `${some} …` : some));
     const [one] = found;
     if (!one) return put(said, say("search_none"));
@@ -136,6 +136,3 @@ export class Tiles {
     this.order(String(one.id));
   }
 }
-
-/** @param {Product} goods */
-const title = ({ id, name }) => `${id} ${name ?? ""}`.trim();

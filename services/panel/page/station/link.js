@@ -244,6 +244,7 @@ export class Link extends EventTarget {
     } else if (word === "time") {
       this.setTime(Number(first));
       if (rest[0]) this.trip = clock() - Number(rest[0]);
+      for (const robot of this.robots.values()) robot.pace.station(Number(first));
     } else if (word === "warehouse") {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");

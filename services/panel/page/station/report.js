@@ -71,11 +71,11 @@ const NOW = {
  * @param {string} word the first word of the line
  * @param {string[]} rest
  * @param {number} now when it came, by this page's clock
- * @param {number} at when it was so, in ms since 1970
+ * @param {number} at the same in ms since 1970, or, of what is long over, when it was
  */
 export function report(robot, word, rest, now, at) {
   if (Object.hasOwn(NOW, word)) return NOW[word]?.(robot, rest, now, at);
-  note(robot, word, rest, at);
+  note(robot, word, rest, at - robot.pace.waited);
 }
 
 /**

@@ -1,6 +1,7 @@
 // What is known of one robot. Views draw this, and change none of it.
 
 import { Jobs } from "./jobs.js";
+import { Pace } from "./pace.js";
 import { Frames } from "./quantile.js";
 
 /** @typedef {"left" | "up" | "right" | "down"} Side */
@@ -149,10 +150,12 @@ export class Robot {
      */
     this.thinks = null;
     this.jobs = new Jobs();
+    this.pace = new Pace();
   }
 
   /** Nothing has happened yet. */
   forget() {
+    this.pace = new Pace();
     this.events = [];
     this.thinks = null;
     this.jobs = new Jobs();
@@ -186,14 +189,16 @@ export class Robot {
    *
    * @param {State} state
    * @param {number} now when it came, by this page's clock
-   * @param {number} at when it was so, in ms since 1970
+   * @param {number} at the same in ms since 1970
    */
   become(state, now, at) {
-    this.stoppedSince = state.stop_age_ms === undefined ? null : at - Number(state.stop_age_ms);
+    const { pace } = this;
+    pace.robot(state.time_ms === undefined ? null : Number(state.time_ms), at);
+    this.stoppedSince = state.stop_age_ms === undefined ? null : at - pace.waited - Number(state.stop_age_ms);
     this.stray(state, now);
     this.state = state;
     this.stated = now;
-    this.remember(now);
+    this.remember(now - pace.waited);
   }
 
   /**
@@ -227,16 +232,16 @@ export class Robot {
   /**
    * Keeps what the strips and the trail show.
    *
-   * @param {number} now
+   * @param {number} at when it was so, by this page's clock
    */
-  remember(now) {
+  remember(at) {
     this.total += 1;
     const { state, latency } = this;
     /** @param {keyof State} key */
     const figure = (key) => (state[key] === undefined ? null : Number(state[key]));
     const decivolts = figure("battery_dv");
     this.past.push({
-      at: now,
+      at,
       x: figure("x_mm"),
       y: figure("y_mm"),
       line_error: figure("line_error"),

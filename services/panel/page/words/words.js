@@ -92,7 +92,7 @@ const WORDS = {
     look_unheard: "The robot is not heard: what is shown is old.", look_stopped: "Stopped: it stands until somebody resumes.", look_board: "One of its boards is not heard.",
     look_lost: "It does not know where it stands.", look_needs: "It needs a person.", look_hand: "Somebody drives it by hand.", look_waits: "It waits.", look_drives: "It drives by itself.", look_none: "No robot, or nothing is known yet.",
     colour_accent: "the robot, its way, and what is chosen", colour_goods: "goods", colour_caution: "needs a person, or is old", colour_danger: "STOP, stopped, blocked", colour_quiet: "labels, and what is old",
-    key_stop: "STOP, whatever has the focus", key_space: "STOP, but for a field to write in and for Resume", key_help: "this help, unless armed", help_view_keys: "Keys of the views", key_search: "find goods by number or name", key_events: "what happened before, and after", key_time: "on the time line and the curves: another moment", key_queue: "move the order that has the focus", key_queue_out: "take that order out", key_next: "the next control", key_tabs: "another view, on the list of views", key_press: "press a button, tick a box",
+    key_stop: "STOP, whatever has the focus", key_space: "STOP, but for a field to write in and for Resume", key_help: "this help, unless armed", help_view_keys: "Keys of the views", key_search: "find goods by number or name", key_events: "what happened before, and after", key_time: "on the time line and the curves: another moment", key_queue: "move the order that has the focus", key_queue_out: "take that order out", key_undo: "in Set up: undo", key_redo: "in Set up: do it again", key_save: "in Set up: save", key_next: "the next control", key_tabs: "another view, on the list of views", key_press: "press a button, tick a box",
     key_map: "choose goods, crossings and ways", key_map_enter: "do what the tip says", key_map_move: "move the map", key_map_zoom: "zoom",
     theme: "Theme", theme_system: "Theme: auto", theme_light: "Light", theme_dark: "Dark", sticks: "sticks of the gamepad",
     discard: "Discard", keep_name: "Keep", move: "Move", close: "close", kept: "Where it is kept",
@@ -108,6 +108,7 @@ const WORDS = {
     renew_how: "{0} is simulated. It is stopped and put on the delivery node of this warehouse, and its world begins anew: all goods are in their places. It moves again once somebody releases the stop.",
     renew_drops: "Orders that do not fit any more are dropped: goods {0}.", renew_yes: "Stop it and put it there", renew_no: "Leave it where it is",
     renews: "{0} is stopped and put into the saved warehouse; hold Resume to let it move.",
+    tip_stack: "square {0}: {1}", does_choose: "choose one of them", legend_stack: "several goods; a click lists them",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -197,7 +198,7 @@ const WORDS = {
     look_unheard: "Roboten hörs inte: det som visas är gammalt.", look_stopped: "Stoppad: den står tills någon häver stoppet.", look_board: "Ett av dess kort hörs inte.",
     look_lost: "Den vet inte var den står.", look_needs: "Den behöver en människa.", look_hand: "Någon kör den för hand.", look_waits: "Den väntar.", look_drives: "Den kör själv.", look_none: "Ingen robot, eller inget är känt än.",
     colour_accent: "roboten, dess väg och det som är valt", colour_goods: "varor", colour_caution: "behöver en människa, eller är gammalt", colour_danger: "STOPP, stoppad, spärrad", colour_quiet: "etiketter, och det som är gammalt",
-    key_stop: "STOPP, vad som än har fokus", key_space: "STOPP, utom i ett fält att skriva i och på knappen som häver stoppet", key_help: "den här hjälpen, om det inte är klart att köra", help_view_keys: "Vyernas tangenter", key_search: "sök varor efter nummer eller namn", key_events: "det som hände före, och efter", key_time: "på tidslinjen och kurvorna: ett annat ögonblick", key_queue: "flytta ordern som har fokus", key_queue_out: "ta bort den ordern", key_next: "nästa knapp eller fält", key_tabs: "en annan vy, i listan över vyer", key_press: "tryck en knapp, kryssa i en ruta",
+    key_stop: "STOPP, vad som än har fokus", key_space: "STOPP, utom i ett fält att skriva i och på knappen som häver stoppet", key_help: "den här hjälpen, om det inte är klart att köra", help_view_keys: "Vyernas tangenter", key_search: "sök varor efter nummer eller namn", key_events: "det som hände före, och efter", key_time: "på tidslinjen och kurvorna: ett annat ögonblick", key_queue: "flytta ordern som har fokus", key_queue_out: "ta bort den ordern", key_undo: "i Ställ in: ångra", key_redo: "i Ställ in: gör om", key_save: "i Ställ in: spara", key_next: "nästa knapp eller fält", key_tabs: "en annan vy, i listan över vyer", key_press: "tryck en knapp, kryssa i en ruta",
     key_map: "välj varor, korsningar och vägar", key_map_enter: "gör det som rutan säger", key_map_move: "flytta kartan", key_map_zoom: "zooma",
     theme: "Tema", theme_system: "Tema: auto", theme_light: "Ljust", theme_dark: "Mörkt", sticks: "handkontrollens spakar",
     discard: "Kasta", keep_name: "Behåll", move: "Flytta", close: "stäng", kept: "Var det sparas",
@@ -213,6 +214,7 @@ const WORDS = {
     renew_how: "{0} är simulerad. Den stoppas och ställs på leveransnoden i det här lagret, och dess värld börjar om: alla varor står på sina platser. Den rör sig igen när någon häver stoppet.",
     renew_drops: "Order som inte passar längre stryks: vara {0}.", renew_yes: "Stoppa den och ställ den där", renew_no: "Låt den vara",
     renews: "{0} stoppas och ställs i det sparade lagret; håll Fortsätt för att låta den röra sig.",
+    tip_stack: "ruta {0}: {1}", does_choose: "välj en av dem", legend_stack: "flera varor; ett klick listar dem",
   },
 };
 

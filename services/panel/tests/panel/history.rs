@@ -98,7 +98,10 @@ fn any_time_of_a_robot_is_a_table_whose_heads_have_units() {
         rows[0].starts_with("unix_time_s,x_mm,y_mm,line_error_half_sensors,"),
         "{table}"
     );
-    assert!(rows[0].contains(",battery_V,path_p50_us,"), "{table}");
+    assert!(
+        rows[0].contains(",battery_V,battery_percent,battery_left_s,path_p50_us,"),
+        "{table}"
+    );
     let time = |ms: u64| format!("{}.{:03},", ms / 1_000, ms % 1_000);
     assert!(
         rows[1].starts_with(&format!("{}400,", time(kept.begin_ms))),

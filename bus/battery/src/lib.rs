@@ -13,6 +13,8 @@
 //! the middle of the curve are 8 %. So a percentage is the mean of about a minute. How long the
 //! charge lasts is told only when it has fallen steadily for some minutes. Until somebody has told
 //! how many cells the battery has, and for a robot that cannot measure it, nothing is told.
+//!
+//! It is apart, so that all who tell of a battery tell the same. It never reads a clock.
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -67,7 +69,7 @@ impl Pack {
 
 /// The battery as its readings tell it.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Battery {
+pub struct Battery {
     pack: Pack,
     /// When the last reading came, and the mean of the charge until then.
     mean: Option<(Duration, f64)>,
@@ -77,7 +79,8 @@ pub(crate) struct Battery {
 
 impl Battery {
     /// A battery without a reading.
-    pub(crate) fn new(pack: Pack) -> Self {
+    #[must_use]
+    pub fn new(pack: Pack) -> Self {
         Self {
             pack,
             ..Self::default()
@@ -85,7 +88,7 @@ impl Battery {
     }
 
     /// Takes a reading of this moment of the robot's clock, in tenths of a volt; 0: not known.
-    pub(crate) fn read(&mut self, now: Duration, decivolts: u8) {
+    pub fn read(&mut self, now: Duration, decivolts: u8) {
         if self.pack.cells == 0 || decivolts == 0 {
             return;
         }
@@ -109,13 +112,15 @@ impl Battery {
     }
 
     /// The part of its charge that is left, in percent.
-    pub(crate) fn percent(&self) -> Option<u8> {
+    #[must_use]
+    pub fn percent(&self) -> Option<u8> {
         let (_, charge) = self.mean?;
         Some((charge * 100.0).round() as u8)
     }
 
     /// How long it lasts until the robot stands, if its charge falls clearly.
-    pub(crate) fn left(&self) -> Option<Duration> {
+    #[must_use]
+    pub fn left(&self) -> Option<Duration> {
         let (first, now) = (self.kept.front()?.0, self.kept.back()?.0);
         let watched = now.saturating_sub(first);
         if watched < LEAST {
