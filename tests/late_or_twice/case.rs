@@ -1,6 +1,6 @@
 //! A case of the search: who says what at which time, and which faults come meanwhile.
 
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 use proptest::prelude::*;
 
 /// A process that a fault may freeze.
@@ -99,7 +99,7 @@ pub(crate) struct Case {
 pub(crate) const LENGTH: u64 = 6_000;
 
 /// Turns the wheels until another command comes.
-pub(crate) const LEFT: OperatorCommand = OperatorCommand::Left;
+pub(crate) const LEFT: OperatorCommand = OperatorCommand::Left(Speed::Full);
 /// Turns by 45 degrees, and ends by itself.
 pub(crate) const TURN: OperatorCommand = OperatorCommand::LeftDiag;
 /// A long step of the arm: it closes the claw.

@@ -2,7 +2,7 @@
 
 use lager_orders::{Action, LeaseMs, Mode, Wheels};
 use lager_topics::{Finish, Origin, SteeringOrder};
-use lager_wire::{Command, OperatorCommand};
+use lager_wire::{Command, OperatorCommand, Speed};
 
 use crate::case::Way;
 use crate::judge::Judge;
@@ -166,7 +166,7 @@ impl Logic {
     pub(crate) fn new(way: Way) -> Option<Self> {
         let command = match way {
             Way::ByHand => return None,
-            Way::ByItself => OperatorCommand::Left,
+            Way::ByItself => OperatorCommand::Left(Speed::Full),
             Way::Picking => OperatorCommand::Stop,
         };
         Some(Self {

@@ -18,6 +18,7 @@ mod releases;
 mod scene;
 mod setting_up;
 mod signals;
+mod speeds;
 mod stopping;
 mod time;
 mod traps;
@@ -90,6 +91,8 @@ each_alone! {
     driving::each_key_says_what_the_document_says_once_and_nothing_in_text_fields,
     driving::what_is_old_is_grey_with_its_time_and_drives_nothing,
     driving::of_two_keys_the_newer_counts_and_then_the_older_again,
+    speeds::each_command_says_the_speed_that_is_chosen_and_another_one_counts_at_once,
+    speeds::slow_is_slower_than_middle_and_middle_slower_than_full,
     driving::a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centred,
     driving::a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it,
     driving::in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants,

@@ -115,11 +115,12 @@ impl Scene {
         }
     }
 
-    /// Takes the wheel and sets the manual mode.
+    /// Takes the wheel, chooses full speed and sets the manual mode.
     pub(crate) fn take_over(&mut self, page: &mut Page) {
         page.click("#tab-drive");
         page.click("#control");
         page.wait_for("#control", "You drive");
+        page.click("#speed-full_speed");
         self.by_hand(page);
         self.wait_to_stand();
     }

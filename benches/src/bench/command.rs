@@ -17,7 +17,7 @@ use lager_home::Clock;
 use lager_lines::gag::{Query, Request};
 use lager_ports::Subscriber;
 use lager_topics::{NavMap, Origin, SteeringCommand, SteeringState};
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 use serde::Serialize;
 
 use super::robot::{PATIENCE, Robot};
@@ -66,8 +66,8 @@ pub(crate) fn measure(commands: usize) -> Result<CommandReport> {
     for number in 0..commands {
         // Forwards and backwards in turn, so that it stays where it is, with a pause after each.
         let command = match number % 4 {
-            0 => OperatorCommand::Forward,
-            2 => OperatorCommand::Backward,
+            0 => OperatorCommand::Forward(Speed::Full),
+            2 => OperatorCommand::Backward(Speed::Full),
             _ => OperatorCommand::Stop,
         };
         gag.wait_to_be_asked()?;

@@ -27,7 +27,7 @@ use lager_lines::conversation::RobotLine;
 use lager_lines::gag::{Query, Request};
 use lager_ports::Subscriber;
 use lager_topics::TruthPose;
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 use rustix::process::{Signal, kill_process};
 use serde::Serialize;
 
@@ -85,8 +85,8 @@ pub(crate) fn measure(cuts: usize) -> Result<LinkReport> {
 /// Forwards and backwards in turn, so that the robot stays where it is.
 fn command(number: usize) -> OperatorCommand {
     match number % 2 {
-        0 => OperatorCommand::Forward,
-        _ => OperatorCommand::Backward,
+        0 => OperatorCommand::Forward(Speed::Full),
+        _ => OperatorCommand::Backward(Speed::Full),
     }
 }
 

@@ -15,7 +15,7 @@ use lager_operator::{Driving, For};
 use lager_orders::Moment;
 use lager_ports::{Cause, Publisher};
 use lager_topics::{SteeringCommand, SteeringState};
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 use serde::Serialize;
 
 use super::robot::Robot;
@@ -76,8 +76,8 @@ fn stop_once(
     robot.release()?;
     // Forwards and backwards in turn, so that it stays where it is.
     let command = match number % 2 {
-        0 => OperatorCommand::Forward,
-        _ => OperatorCommand::Backward,
+        0 => OperatorCommand::Forward(Speed::Full),
+        _ => OperatorCommand::Backward(Speed::Full),
     };
     let clock = robot.bus.clock();
     let now = Moment {

@@ -13,13 +13,13 @@
 //!
 //! ```
 //! use lager_lines::command::{Code, read_arm, read_wheels};
-//! use lager_wire::{ArmCommand, OperatorCommand};
+//! use lager_wire::{ArmCommand, OperatorCommand, Speed};
 //!
-//! assert_eq!(read_wheels("7").map(OperatorCommand::from), Ok(OperatorCommand::Right));
+//! assert_eq!(read_wheels("7").map(OperatorCommand::from), Ok(OperatorCommand::Right(Speed::Full)));
 //! for text in ["F3", "0xf3", "243", "11110011"] {
 //!     assert_eq!(read_arm(text).unwrap().get(), ArmCommand::In);
 //! }
-//! assert_eq!(Code(OperatorCommand::Right).to_string(), "00000111");
+//! assert_eq!(Code(OperatorCommand::Right(Speed::Full)).to_string(), "00000111");
 //!
 //! // A code of the arm is refused for the wheels, and so is a code that no list has.
 //! assert_eq!(

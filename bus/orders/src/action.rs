@@ -4,7 +4,7 @@
 use core::time::Duration;
 
 use lager_floor::{Place, ProductId};
-use lager_wire::{OperatorArm, OperatorCommand};
+use lager_wire::{OperatorArm, OperatorCommand, Speed};
 
 use crate::lease::{LATEST, LATEST_MOVE};
 use crate::mode::{Mode, Pick};
@@ -152,7 +152,7 @@ impl LeaseMs {
     }
 }
 
-/// An operator's command to the wheels, with a code from 1 to 9.
+/// An operator's command to the wheels, with a code from 1 to 9, and its speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Wheels(OperatorCommand);
 
@@ -168,6 +168,11 @@ impl Wheels {
             OperatorCommand::Arm(_) => None,
             wheels => Some(Self(wheels)),
         }
+    }
+
+    /// The same command at a speed, if it has speeds.
+    pub fn at(self, speed: Speed) -> Option<Self> {
+        self.0.at(speed).map(Self)
     }
 }
 

@@ -60,6 +60,7 @@ class Refusal(enum.IntEnum):
     OriginalBoard = 10
     Stale = 11
     ArmUnlimited = 12
+    FullSpeedOnly = 13
 
 
 class ArmProfileState(enum.IntEnum):

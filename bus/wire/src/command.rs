@@ -6,7 +6,37 @@
 use crate::coded::coded;
 
 coded! {
-    /// A command to the wheels; the high nibble of its code is 0 (T3).
+    /// How fast a person drives.
+    pub enum Speed {
+        /// As fast as the robot drives by itself.
+        Full = 0,
+        /// A quarter of that.
+        Slow = 1,
+        /// Half of that.
+        Middle = 2,
+    }
+}
+
+impl Speed {
+    /// The word.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Slow => "slow",
+            Self::Middle => "middle",
+            Self::Full => "full",
+        }
+    }
+
+    /// The speed with this word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        let mut all = Self::ALL.iter().copied();
+        all.find(|speed| speed.as_str() == word)
+    }
+}
+
+coded! {
+    /// A command to the wheels; the high nibble of its code is 0 (T3). Only boards of this project
+    /// have the codes with 1 and 2 there: the [`Speed`] of the command in the low nibble.
     pub enum WheelCommand {
         /// Stand still. The arm may move only in this state (T4).
         Standby = 1,
@@ -30,10 +60,47 @@ coded! {
         RightPerp = 10,
         /// 45 degrees right, once.
         RightDiag = 11,
+        /// Straight ahead, slowly.
+        SlowForward = 0x12,
+        /// Straight back, slowly.
+        SlowBackward = 0x14,
+        /// Turn left, slowly.
+        SlowLeft = 0x16,
+        /// Turn right, slowly.
+        SlowRight = 0x19,
+        /// Straight ahead at the middle speed.
+        MiddleForward = 0x22,
+        /// Straight back at the middle speed.
+        MiddleBackward = 0x24,
+        /// Turn left at the middle speed.
+        MiddleLeft = 0x26,
+        /// Turn right at the middle speed.
+        MiddleRight = 0x29,
     }
 }
 
 impl WheelCommand {
+    /// The same command at full speed.
+    #[must_use]
+    pub const fn at_full(self) -> Self {
+        match self {
+            Self::SlowForward | Self::MiddleForward => Self::ManualForward,
+            Self::SlowBackward | Self::MiddleBackward => Self::ManualBackward,
+            Self::SlowLeft | Self::MiddleLeft => Self::ManualLeft,
+            Self::SlowRight | Self::MiddleRight => Self::ManualRight,
+            full => full,
+        }
+    }
+
+    /// Its speed. Commands that are not given by hand have no other speed than the full one.
+    pub const fn speed(self) -> Speed {
+        match self.code() >> 4 {
+            1 => Speed::Slow,
+            2 => Speed::Middle,
+            _ => Speed::Full,
+        }
+    }
+
     /// Whether it runs once and ends by itself. Otherwise it is a setpoint that holds.
     pub const fn is_one_shot(self) -> bool {
         matches!(

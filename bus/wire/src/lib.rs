@@ -34,7 +34,7 @@ mod text;
 pub use arm::{ArmLimits, ArmPose, ArmProfile, ArmProfileError, JointLimits, SERVO_MAX};
 pub use board::{ArmData, BoardStatus, servo};
 pub use bytes::PAYLOAD_LENGTH;
-pub use command::{ArmCommand, Command, WheelCommand};
+pub use command::{ArmCommand, Command, Speed, WheelCommand};
 pub use crc::checksum;
 pub use decoder::{Decoder, DecoderCounters};
 pub use handshake::{Callsign, Handshake, ResetCause, SynAck, Version};

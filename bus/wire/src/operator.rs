@@ -4,7 +4,7 @@
 //! They are apart because both lists use the codes 1 to 11 for different things. Every command from
 //! a person goes through this table. Quarter turns and the delivery drop are not in it.
 
-use crate::command::{ArmCommand, Command, WheelCommand};
+use crate::command::{ArmCommand, Command, Speed, WheelCommand};
 
 /// An arm command that an operator may give: each one but the delivery drop (AMB-27).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -31,17 +31,17 @@ pub enum OperatorCommand {
     /// Stand still. Code 1.
     Stop,
     /// Straight ahead. Code 2.
-    Forward,
+    Forward(Speed),
     /// Follow the line forward. Code 3.
     FollowForward,
     /// Straight back. Code 4.
-    Backward,
+    Backward(Speed),
     /// Follow the line backward. Code 5.
     FollowBackward,
     /// Turn left. Code 6.
-    Left,
+    Left(Speed),
     /// Turn right. Code 7.
-    Right,
+    Right(Speed),
     /// 45 degrees left. Code 8.
     LeftDiag,
     /// 45 degrees right. Code 9.
@@ -51,15 +51,15 @@ pub enum OperatorCommand {
 }
 
 impl OperatorCommand {
-    /// Every command, wheels first.
+    /// Every command, wheels first, at full speed.
     pub const ALL: [Self; 19] = [
         Self::Stop,
-        Self::Forward,
+        Self::Forward(Speed::Full),
         Self::FollowForward,
-        Self::Backward,
+        Self::Backward(Speed::Full),
         Self::FollowBackward,
-        Self::Left,
-        Self::Right,
+        Self::Left(Speed::Full),
+        Self::Right(Speed::Full),
         Self::LeftDiag,
         Self::RightDiag,
         Self::Arm(OperatorArm(ArmCommand::Clockwise)),
@@ -74,16 +74,16 @@ impl OperatorCommand {
         Self::Arm(OperatorArm(ArmCommand::Release)),
     ];
 
-    /// The command with this operator code; `None` for codes outside 1 to 9 and 0xF1 to 0xFA.
+    /// The command with this operator code, at full speed; `None` for codes outside 1 to 9 and 0xF1 to 0xFA.
     pub const fn from_code(code: u8) -> Option<Self> {
         Some(match code {
             1 => Self::Stop,
-            2 => Self::Forward,
+            2 => Self::Forward(Speed::Full),
             3 => Self::FollowForward,
-            4 => Self::Backward,
+            4 => Self::Backward(Speed::Full),
             5 => Self::FollowBackward,
-            6 => Self::Left,
-            7 => Self::Right,
+            6 => Self::Left(Speed::Full),
+            7 => Self::Right(Speed::Full),
             8 => Self::LeftDiag,
             9 => Self::RightDiag,
             _ => match ArmCommand::from_code(code) {
@@ -97,12 +97,12 @@ impl OperatorCommand {
     pub const fn code(self) -> u8 {
         match self {
             Self::Stop => 1,
-            Self::Forward => 2,
+            Self::Forward(_) => 2,
             Self::FollowForward => 3,
-            Self::Backward => 4,
+            Self::Backward(_) => 4,
             Self::FollowBackward => 5,
-            Self::Left => 6,
-            Self::Right => 7,
+            Self::Left(_) => 6,
+            Self::Right(_) => 7,
             Self::LeftDiag => 8,
             Self::RightDiag => 9,
             Self::Arm(arm) => arm.0.code(),
@@ -112,17 +112,54 @@ impl OperatorCommand {
     /// The board's command for it. Only here do operator codes become firmware codes: 7 becomes 9,
     /// 9 becomes 11, and nothing becomes 7 or 10.
     pub const fn firmware(self) -> Command {
+        use Speed::{Full, Middle, Slow};
+        use WheelCommand::{
+            ActiveBackward, ActiveForward, LeftDiag, ManualBackward, ManualForward, ManualLeft,
+            ManualRight, MiddleBackward, MiddleForward, MiddleLeft, MiddleRight, RightDiag,
+            SlowBackward, SlowForward, SlowLeft, SlowRight, Standby,
+        };
         match self {
-            Self::Stop => Command::Wheel(WheelCommand::Standby),
-            Self::Forward => Command::Wheel(WheelCommand::ManualForward),
-            Self::FollowForward => Command::Wheel(WheelCommand::ActiveForward),
-            Self::Backward => Command::Wheel(WheelCommand::ManualBackward),
-            Self::FollowBackward => Command::Wheel(WheelCommand::ActiveBackward),
-            Self::Left => Command::Wheel(WheelCommand::ManualLeft),
-            Self::Right => Command::Wheel(WheelCommand::ManualRight),
-            Self::LeftDiag => Command::Wheel(WheelCommand::LeftDiag),
-            Self::RightDiag => Command::Wheel(WheelCommand::RightDiag),
+            Self::Stop => Command::Wheel(Standby),
+            Self::Forward(Full) => Command::Wheel(ManualForward),
+            Self::Forward(Middle) => Command::Wheel(MiddleForward),
+            Self::Forward(Slow) => Command::Wheel(SlowForward),
+            Self::FollowForward => Command::Wheel(ActiveForward),
+            Self::Backward(Full) => Command::Wheel(ManualBackward),
+            Self::Backward(Middle) => Command::Wheel(MiddleBackward),
+            Self::Backward(Slow) => Command::Wheel(SlowBackward),
+            Self::FollowBackward => Command::Wheel(ActiveBackward),
+            Self::Left(Full) => Command::Wheel(ManualLeft),
+            Self::Left(Middle) => Command::Wheel(MiddleLeft),
+            Self::Left(Slow) => Command::Wheel(SlowLeft),
+            Self::Right(Full) => Command::Wheel(ManualRight),
+            Self::Right(Middle) => Command::Wheel(MiddleRight),
+            Self::Right(Slow) => Command::Wheel(SlowRight),
+            Self::LeftDiag => Command::Wheel(LeftDiag),
+            Self::RightDiag => Command::Wheel(RightDiag),
             Self::Arm(arm) => Command::Arm(arm.0),
+        }
+    }
+
+    /// The same command at a speed; `None` if it has no speeds. Those that follow the line, turn by
+    /// a fixed angle or stand have none.
+    pub const fn at(self, speed: Speed) -> Option<Self> {
+        Some(match self {
+            Self::Forward(_) => Self::Forward(speed),
+            Self::Backward(_) => Self::Backward(speed),
+            Self::Left(_) => Self::Left(speed),
+            Self::Right(_) => Self::Right(speed),
+            _ => return None,
+        })
+    }
+
+    /// Its speed.
+    pub const fn speed(self) -> Speed {
+        match self {
+            Self::Forward(speed)
+            | Self::Backward(speed)
+            | Self::Left(speed)
+            | Self::Right(speed) => speed,
+            _ => Speed::Full,
         }
     }
 
@@ -131,12 +168,12 @@ impl OperatorCommand {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Stop => "stop",
-            Self::Forward => "forward",
+            Self::Forward(_) => "forward",
             Self::FollowForward => "follow-forward",
-            Self::Backward => "backward",
+            Self::Backward(_) => "backward",
             Self::FollowBackward => "follow-backward",
-            Self::Left => "left",
-            Self::Right => "right",
+            Self::Left(_) => "left",
+            Self::Right(_) => "right",
             Self::LeftDiag => "left-diag",
             Self::RightDiag => "right-diag",
             Self::Arm(arm) => match arm.0 {

@@ -32,6 +32,7 @@ pub mod line;
 mod load;
 mod outbox;
 pub mod pd;
+mod pulses;
 pub mod register;
 mod replies;
 mod reset;

@@ -2,19 +2,21 @@
 //! (W1-W5, T5).
 //!
 //! ```text
-//!              2,4,6,9                3,5                    7,8,10,11
+//!        2,4,6,9 (any speed)          3,5                    7,8,10,11
 //!   Manual <------------ any ------------------> Follow     any ----> Turn
 //!      |                                           |                   | time up, tape
 //!      '------------------- 1 ---------------------'---> Standby <-----'
 //! ```
 //!
 //! Every wheel command replaces the mode before it; only a turn ends by itself. The duty is the
-//! standard one or 0 in every mode except following. [`crate::follow`] gives following up without
+//! standard one or 0 in every mode except following; [`crate::pulses`] makes a person's lower speeds
+//! of it. [`crate::follow`] gives following up without
 //! words or tape; the robot then stands until the next command.
 
 use lager_wire::{LineBits, WheelCommand};
 
 use crate::follow::{Follow, Lost};
+use crate::pulses::Pulses;
 use crate::turn::{Angle, Rotation, Turn};
 use crate::{Motor, PWM_STANDARD};
 
@@ -34,7 +36,7 @@ pub(crate) enum Along {
 #[derive(Debug, Clone)]
 enum Mode {
     Standby,
-    Manual(WheelCommand),
+    Manual(WheelCommand, Pulses),
     Follow {
         along: Along,
         seq: u8,
@@ -79,16 +81,13 @@ impl Wheels {
         };
         self.mode = match command {
             WheelCommand::Standby => Mode::Standby,
-            WheelCommand::ManualForward
-            | WheelCommand::ManualBackward
-            | WheelCommand::ManualLeft
-            | WheelCommand::ManualRight => Mode::Manual(command),
             WheelCommand::ActiveForward => follow(Along::Forward),
             WheelCommand::ActiveBackward => follow(Along::Backward),
             WheelCommand::LeftPerp => turn(Rotation::Left, Angle::Perpendicular),
             WheelCommand::LeftDiag => turn(Rotation::Left, Angle::Diagonal),
             WheelCommand::RightPerp => turn(Rotation::Right, Angle::Perpendicular),
             WheelCommand::RightDiag => turn(Rotation::Right, Angle::Diagonal),
+            by_hand => Mode::Manual(by_hand, Pulses::new(by_hand.speed(), now_us)),
         };
     }
 
@@ -103,15 +102,19 @@ impl Wheels {
 
     /// Ends a turn that is over, and returns its number. Starts the clock of a turn that may begin.
     pub(crate) fn advance(&mut self, may_turn: bool, now_us: u32) -> Option<u8> {
-        let Mode::Turn {
-            seq,
-            rotation,
-            angle,
-            under_way,
-            ..
-        } = &mut self.mode
-        else {
-            return None;
+        let (seq, rotation, angle, under_way) = match &mut self.mode {
+            Mode::Turn {
+                seq,
+                rotation,
+                angle,
+                under_way,
+                ..
+            } => (seq, rotation, angle, under_way),
+            Mode::Manual(_, pulses) => {
+                pulses.advance(now_us);
+                return None;
+            }
+            _ => return None,
         };
         match under_way {
             Some(turn) if turn.is_over(now_us) => {
@@ -163,10 +166,13 @@ impl Wheels {
         let ahead = Motor::forward(PWM_STANDARD);
         let back = Motor::backward(PWM_STANDARD);
         match &self.mode {
-            Mode::Manual(WheelCommand::ManualForward) => (ahead, ahead),
-            Mode::Manual(WheelCommand::ManualBackward) => (back, back),
-            Mode::Manual(WheelCommand::ManualLeft) => (back, ahead),
-            Mode::Manual(WheelCommand::ManualRight) => (ahead, back),
+            Mode::Manual(command, _) => match command.at_full() {
+                WheelCommand::ManualForward => (ahead, ahead),
+                WheelCommand::ManualBackward => (back, back),
+                WheelCommand::ManualLeft => (back, ahead),
+                WheelCommand::ManualRight => (ahead, back),
+                _ => STILL,
+            },
             Mode::Follow { along, watch, .. } if watch.lost().is_none() => {
                 correction.map_or(STILL, |u| follow(*along, u))
             }
@@ -177,7 +183,15 @@ impl Wheels {
                 Rotation::Left => (back, ahead),
                 Rotation::Right => (ahead, back),
             },
-            Mode::Standby | Mode::Manual(_) | Mode::Follow { .. } | Mode::Turn { .. } => STILL,
+            Mode::Standby | Mode::Follow { .. } | Mode::Turn { .. } => STILL,
+        }
+    }
+
+    /// The pulses in which the motors get their duties.
+    pub(crate) fn pulses(&self) -> &Pulses {
+        match &self.mode {
+            Mode::Manual(_, pulses) => pulses,
+            _ => &Pulses::NONE,
         }
     }
 
@@ -209,7 +223,7 @@ impl Wheels {
     pub(crate) fn command(&self) -> WheelCommand {
         match self.mode {
             Mode::Standby => WheelCommand::Standby,
-            Mode::Manual(command) | Mode::Turn { command, .. } => command,
+            Mode::Manual(command, _) | Mode::Turn { command, .. } => command,
             Mode::Follow {
                 along: Along::Forward,
                 ..
@@ -221,7 +235,7 @@ impl Wheels {
         }
     }
 
-    /// When a turn ends at the latest, or following is given up if nothing comes.
+    /// When a turn ends at the latest, following is given up if nothing comes, or a pulse ends.
     pub(crate) fn next_due_us(&self) -> Option<u32> {
         match &self.mode {
             Mode::Turn {
@@ -229,6 +243,7 @@ impl Wheels {
                 ..
             } => Some(turn.ends_us()),
             Mode::Follow { watch, .. } => watch.next_due_us(),
+            Mode::Manual(_, pulses) => pulses.next_due_us(),
             _ => None,
         }
     }

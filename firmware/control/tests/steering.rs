@@ -3,7 +3,7 @@
 mod support;
 
 use lager_control::{Motor, SteeringConfig};
-use lager_wire::{Payload, SteerCommand, SteerFlags};
+use lager_wire::{Command, Payload, SteerCommand, SteerFlags};
 use support::Bench;
 use support::servos::Servos;
 
@@ -452,9 +452,9 @@ fn the_failsafe_holds_while_the_clock_goes_round() {
 fn undefined_codes_are_refused_counted_and_change_nothing() {
     let mut bench = Bench::ready();
     let undefined: Vec<u8> = (0..=255)
-        .filter(|code| !matches!(code, 0x01..=0x0B | 0xF1..=0xFB))
+        .filter(|code| Command::from_code(*code).is_none())
         .collect();
-    assert_eq!(undefined.len(), 256 - 22);
+    assert_eq!(undefined.len(), 256 - 30);
     bench.command(FOLLOW);
     bench.run_ms(50);
     for (seq, code) in (100_u8..=255).cycle().zip(undefined) {
@@ -471,7 +471,7 @@ fn undefined_codes_are_refused_counted_and_change_nothing() {
         Payload::BoardStatus(status) => Some(status),
         _ => None,
     });
-    assert_eq!(status.last().unwrap().1.refused, 234);
+    assert_eq!(status.last().unwrap().1.refused, 226);
 }
 
 #[test]

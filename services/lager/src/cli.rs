@@ -17,7 +17,7 @@ use clap::{Args, Parser, Subcommand};
 use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS};
 use lager_lines::Called;
 use lager_supervisor::Parent;
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 pub use gateway::GatewayArgs;
@@ -27,7 +27,7 @@ pub use simulate::SimulateArgs;
 pub use top::TopArgs;
 pub use topic::{TopicArgs, TopicCommand};
 
-pub use values::Fetch;
+pub use values::{Fetch, at_speed};
 
 use crate::config::{Body, flag};
 
@@ -132,6 +132,10 @@ pub enum Command {
         /// Name or code of the command
         #[arg(allow_negative_numbers = true, value_parser = values::wheel_command)]
         command: OperatorCommand,
+        /// How fast to drive forward or backward, or to turn left or right: at full speed if it is
+        /// left out, as the robot does by itself, at half of it (middle) or a quarter (slow)
+        #[arg(long, value_parser = values::driving_speed())]
+        speed: Option<Speed>,
         /// Stop driving after this many seconds, not at Ctrl-C
         #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::seconds)]
         seconds: Option<f64>,

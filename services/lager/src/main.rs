@@ -286,7 +286,11 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             patience()?;
             stop::run(&config)?
         }
-        Command::Drive { command, seconds } => operator()?.steer(command, seconds)?,
+        Command::Drive {
+            command,
+            speed,
+            seconds,
+        } => operator()?.steer(cli::at_speed(command, speed)?, seconds)?,
         Command::Resume => {
             // Take the stop of this moment: a later stop must not be released.
             let before = stop::current(&config)?;

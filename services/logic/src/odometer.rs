@@ -118,12 +118,14 @@ fn nominal(code: u8) -> (f32, f32) {
     let Some(Command::Wheel(command)) = Command::from_code(code) else {
         return (0.0, 0.0);
     };
-    match command {
+    match command.at_full() {
         Standby => (0.0, 0.0),
         ManualForward | ActiveForward => (1.0, 1.0),
         ManualBackward | ActiveBackward => (-1.0, -1.0),
         ManualLeft | LeftPerp | LeftDiag => (-1.0, 1.0),
         ManualRight | RightPerp | RightDiag => (1.0, -1.0),
+        // `at_full` gives none of these.
+        _ => (0.0, 0.0),
     }
 }
 

@@ -9,7 +9,7 @@ use lager_topics::{
     AskKind, BridgeAnswer, Health, InputKind, NavigatorStatus, OrderQueue, Outcome, Phase,
     SteeringReport, WaitingOrder, WorldAnswer,
 };
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 
 /// The moment `ms` ms after the robot was switched on, the same on both clocks.
 fn at(ms: u64) -> Moment {
@@ -167,7 +167,7 @@ fn a_setpoint_is_renewed_and_is_over_after_a_pause_or_a_silent_board() {
     };
     let begun = || {
         let mut driving = Driving::default();
-        let command = OperatorCommand::Forward;
+        let command = OperatorCommand::Forward(Speed::Full);
         driving.begin(at(0), Duration::ZERO, 9, command, whose);
         driving
     };

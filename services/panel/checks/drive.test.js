@@ -94,3 +94,45 @@ test("a list without entries, and one of another kind, say nothing", () => {
   later(() => [pad([0, 0], { mapping: "" })]);
   assert.equal(later(() => [pad([0, -1], { mapping: "" })], 50), null);
 });
+
+test("a shoulder button turns the speed once a press, on a pad that is believed", () => {
+  anew();
+  const turned = (pressed, ms = 50) => {
+    later(() => [pad([0, 0], { pressed })], ms);
+    return reader.turned;
+  };
+  assert.equal(turned([5], 600), 0);
+  assert.equal(turned([5], 600), 0);
+  assert.equal(turned([]), 0);
+  assert.equal(turned([5]), 1);
+  assert.equal(turned([5]), 0);
+  assert.equal(turned([4]), -1);
+  assert.equal(turned([4, 5]), 0);
+  // One that came with its stick at an end is not believed.
+  anew();
+  for (const pressed of [[], [], [5]]) later(() => [pad([0, -1], { pressed })]);
+  assert.equal(reader.turned, 0);
+});
+
+test("a speed is the middle one at first, is kept, and goes no further than its ends", async () => {
+  const kept = new Map();
+  globalThis.localStorage = { getItem: (key) => kept.get(key) ?? null, setItem: (key, value) => kept.set(key, value) };
+  const { Speed } = await import("../page/drive/speed.js");
+  let changes = 0;
+  const made = () => {
+    const steps = ["slow", "middle", "full"].map((step) => [step, { addEventListener() {}, setAttribute(name, value) { this[name] = value; } }]);
+    return new Speed(new Map(steps), () => changes++);
+  };
+  const speed = made();
+  assert.equal(speed.said, " middle");
+  for (const [way, said] of [[-1, " slow"], [-1, " slow"], [0, " slow"], [1, " middle"], [1, ""], [1, ""]]) {
+    speed.turn(way);
+    assert.equal(speed.said, said);
+  }
+  assert.equal(changes, 3);
+  const pressed = [...speed.buttons.values()].map((button) => button["aria-pressed"]);
+  assert.deepEqual(pressed, ["false", "false", "true"]);
+  assert.equal(made().said, "");
+  kept.set("speed", "warp");
+  assert.equal(made().said, " middle");
+});

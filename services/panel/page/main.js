@@ -86,7 +86,7 @@ const missions = new Missions(link, {
   past: at("past"), pastOpen: at("past-open"), pastGoods: at("past-goods"), pastTime: at("past-time"), pastTotals: at("past-totals"), history: at("history"),
 }, robot, { offers: offered({ isPast: () => false, isSetUp: () => false, robot }), isArmed: () => at("armed").checked, isOpen: () => !at("missions").hidden });
 const arm = new Arm(at("arm-drawing"));
-const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), sticks: at("sticks"), resume: at("drive-resume") }, robot, now);
+const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), speed: at("speed"), arm: at("arm"), sticks: at("sticks"), resume: at("drive-resume") }, robot, now);
 const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("hand-said"), take: at("hand-now"), leave: at("hand-leave") }, robot, () => act("mode manual"), (...words) => driving.tell(...words));
 const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
 const wheel = new Wheel(link, { button: at("control"), name: at("name") }, robot, driving, where);

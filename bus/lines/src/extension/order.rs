@@ -15,7 +15,8 @@
 //!                                      is put there
 //!            | pick manual|auto        who picks the goods up from now on: a person, or the robot
 //!            | picked [force]          the goods are in the gripper; force: felt or not
-//!            | drive <styrcomm> <ms>   the wheels, for 1 to 1000 ms from receipt
+//!            | drive <styrcomm> [<speed>] <ms>
+//!                                      the wheels, for 1 to 1000 ms from receipt
 //!            | arm <armcomm>           one step of the arm
 //!            | gains <int> <int>       of the error and of its change, each 0 to 255
 //!            | calibrate               the line sensors, on the tape under the robot
@@ -24,6 +25,7 @@
 //!            | obstacle take <edge>
 //! <order>  ::= <int>                   0 to 4294967295, chosen by the station; 0 is refused
 //! <mode>   ::= manual | autonomous
+//! <speed>  ::= slow | middle | full     full if it is left out; 2, 4, 6 and 7 alone have one
 //! <edge>   ::= <coord> <direction>     from a node to the next one that way
 //! ```
 
@@ -31,7 +33,7 @@ use core::fmt;
 
 use lager_floor::{Place, ProductId};
 use lager_orders::{Action, LeaseMs, Mode, Pick, Put};
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 use thiserror::Error;
 
 use super::fields::Value as _;
@@ -207,12 +209,7 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
                 })?,
         },
         "pick" => Action::Pick(reader.word().read("manual or auto", Pick::from_word)?),
-        "drive" => Action::Drive {
-            wheels: read_command(reader.word(), read_wheels)?,
-            lease: reader.word().read("a time from 1 to 1000 ms", |word| {
-                u16::of(word).and_then(LeaseMs::new)
-            })?,
-        },
+        "drive" => read_drive(&mut reader)?,
         "arm" => Action::Arm(read_command(reader.word(), read_arm)?),
         "gains" => Action::Gains {
             p: reader.word().number("a gain from 0 to 255", 0, 255)?,
@@ -236,6 +233,26 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
     };
     reader.end()?;
     Ok(action)
+}
+
+fn read_drive(reader: &mut Reader<'_>) -> Result<Action, Fault> {
+    let mut wheels = read_command(reader.word(), read_wheels)?;
+    let word = reader.ahead();
+    if word
+        .text
+        .starts_with(|letter: char| letter.is_ascii_alphabetic())
+    {
+        reader.word();
+        let wanted = match wheels.at(Speed::Full) {
+            Some(_) => "slow, middle, full or a time from 1 to 1000 ms",
+            None => "a time from 1 to 1000 ms (only 2, 4, 6 and 7 have a speed)",
+        };
+        wheels = word.read(wanted, |word| wheels.at(Speed::from_word(word)?))?;
+    }
+    let lease = reader.word().read("a time from 1 to 1000 ms", |word| {
+        u16::of(word).and_then(LeaseMs::new)
+    })?;
+    Ok(Action::Drive { wheels, lease })
 }
 
 fn read_command<T>(word: Word<'_>, read: fn(&str) -> Result<T, CommandError>) -> Result<T, Fault> {
@@ -290,8 +307,12 @@ impl fmt::Display for Spelled<'_> {
             Action::Picked { force: true } => formatter.write_str("picked force"),
             Action::Pick(pick) => write!(formatter, "pick {}", pick.as_str()),
             Action::Drive { wheels, lease } => {
-                let code = Code(OperatorCommand::from(*wheels));
-                write!(formatter, "drive {code} {}", lease.get())
+                let command = OperatorCommand::from(*wheels);
+                let (code, lease) = (Code(command), lease.get());
+                match command.speed() {
+                    Speed::Full => write!(formatter, "drive {code} {lease}"),
+                    slower => write!(formatter, "drive {code} {} {lease}", slower.as_str()),
+                }
             }
             Action::Arm(step) => write!(formatter, "arm {}", Code(OperatorCommand::Arm(*step))),
             Action::Gains { p, d } => write!(formatter, "gains {p} {d}"),

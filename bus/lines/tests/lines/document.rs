@@ -4,18 +4,18 @@ use lager_floor::{Heading, Node, Product, ProductId, SideLength};
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Goods, map_string, read_map};
 use lager_lines::{Products, Text, to_line};
-use lager_wire::{ArmCommand, OperatorArm, OperatorCommand};
+use lager_wire::{ArmCommand, OperatorArm, OperatorCommand, Speed};
 
 /// 3.3.7, "Styrkommando": number, value, what it does. The labels of 3 and 5 are exchanged there
 /// (AMB-1); the list of 3.3.1 has them as here.
 const WHEELS: [(&str, &str, OperatorCommand); 9] = [
     ("1", "00000001", OperatorCommand::Stop),
-    ("2", "00000010", OperatorCommand::Forward),
+    ("2", "00000010", OperatorCommand::Forward(Speed::Full)),
     ("3", "00000011", OperatorCommand::FollowForward),
-    ("4", "00000100", OperatorCommand::Backward),
+    ("4", "00000100", OperatorCommand::Backward(Speed::Full)),
     ("5", "00000101", OperatorCommand::FollowBackward),
-    ("6", "00000110", OperatorCommand::Left),
-    ("7", "00000111", OperatorCommand::Right),
+    ("6", "00000110", OperatorCommand::Left(Speed::Full)),
+    ("7", "00000111", OperatorCommand::Right(Speed::Full)),
     ("8", "00001000", OperatorCommand::LeftDiag),
     ("9", "00001001", OperatorCommand::RightDiag),
 ];

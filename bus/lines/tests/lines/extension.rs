@@ -8,7 +8,7 @@ use lager_lines::extension::{
 };
 use lager_lines::{Name, to_line};
 use lager_orders::{Action, LeaseMs, Mode, Pick};
-use lager_wire::{Binary, LineBits};
+use lager_wire::{Binary, LineBits, OperatorCommand, Speed};
 
 #[test]
 fn every_line_of_the_station_is_read_and_written() {
@@ -32,6 +32,8 @@ fn every_line_of_the_station_is_read_and_written() {
         "do 11 pick manual",
         "do 10 drive 00000010 1",
         "do 11 drive 00001001 1000",
+        "do 11 drive 00000010 slow 150",
+        "do 11 late 35 drive 00000111 middle 150",
         "do 12 arm 11111010",
         "do 13 gains 0 255",
         "do 14 calibrate",
@@ -43,6 +45,23 @@ fn every_line_of_the_station_is_read_and_written() {
         assert!(!matches!(read, StationLine::Answer(_)), "{line}");
         assert_eq!(read.to_string(), line);
     }
+}
+
+#[test]
+fn a_drive_says_its_own_speed_and_is_full_without_one() {
+    let read = |line: &str| match StationLine::read(line) {
+        Ok(StationLine::Order(Order::Do { action, .. })) => action,
+        other => panic!("{line}: {other:?}"),
+    };
+    assert_eq!(read("do 1 drive 2 full 150"), read("do 1 drive 2 150"));
+    let Action::Drive { wheels, lease } = read("do 1 drive 4 slow 150") else {
+        panic!("a drive");
+    };
+    assert_eq!(
+        OperatorCommand::from(wheels),
+        OperatorCommand::Backward(Speed::Slow)
+    );
+    assert_eq!(lease.get(), 150);
 }
 
 /// The last of the line sensors has seen tape.

@@ -77,6 +77,8 @@ const Y: &str = "a y from 0 to 255";
 const NAME: &str = "a name of 1 to 32 of a-z, 0-9, - and _";
 const CM: &str = "a side of 40 to 500 cm";
 const LEASE: &str = "a time from 1 to 1000 ms";
+const SPEED: &str = "slow, middle, full or a time from 1 to 1000 ms";
+const NO_SPEED: &str = "a time from 1 to 1000 ms (only 2, 4, 6 and 7 have a speed)";
 const SQUARE_X: &str = "the x of its square, 0 to 255";
 const SERVOS: &str = "a row of eight positions from 0 to 1023 or - with commas between";
 const NEW_FIELD: &str = "a field that has not been given yet";
@@ -284,6 +286,14 @@ fn lines_of_the_station_that_are_none() {
             ("do 1 drive 2", ends(13, LEASE)),
             ("do 1 drive 2 0", word(14, "0", LEASE)),
             ("do 1 drive 2 1001", word(14, "1001", LEASE)),
+            ("do 1 drive 2 quick 150", word(14, "quick", SPEED)),
+            ("do 1 drive 2 slow", ends(18, LEASE)),
+            (
+                "do 1 drive 2 150 slow",
+                word(18, "slow", "the end of the line"),
+            ),
+            ("do 1 drive 3 slow 150", word(14, "slow", NO_SPEED)),
+            ("do 1 drive 1 full 150", word(14, "full", NO_SPEED)),
             ("do 1 drive 10 100", not_of_wheels(12, 10)),
             ("do 1 arm 2", not_of_arm(10, 2)),
             ("do 1 gains 256 0", word(12, "256", "a gain from 0 to 255")),

@@ -10,7 +10,7 @@ use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
 use lager_lines::{Name, Products, Text, to_line};
 use lager_orders::{Action, LeaseMs, Mode, Pick, Put, Reason, Wheels};
-use lager_wire::{Binary, LineBits, LineReading, OperatorArm, OperatorCommand};
+use lager_wire::{Binary, LineBits, LineReading, OperatorArm, OperatorCommand, Speed};
 use proptest::option::of;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -59,7 +59,10 @@ fn command() -> impl Strategy<Value = OperatorCommand> {
 }
 
 fn wheels() -> impl Strategy<Value = Wheels> {
-    command().prop_filter_map("wheels", Wheels::new)
+    let speed = select(Speed::ALL);
+    (command(), speed).prop_filter_map("wheels", |(command, speed)| {
+        Wheels::new(command.at(speed).unwrap_or(command))
+    })
 }
 
 fn arm() -> impl Strategy<Value = OperatorArm> {

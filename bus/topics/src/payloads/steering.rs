@@ -73,6 +73,8 @@ coded! {
         Stale = 11,
         /// The steering board does not obey the arm's profile, so nothing limits the arm.
         ArmUnlimited = 12,
+        /// The steering board is an original one, which knows the full speed only.
+        FullSpeedOnly = 13,
     }
 }
 

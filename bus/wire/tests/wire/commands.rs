@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use lager_wire::{
     ArmCommand, Binary, CodeTextError, Command, OperatorArm, OperatorCommand, Packet, Payload,
-    SteerCommand, Version, WheelCommand, parse_code,
+    Speed, SteerCommand, Version, WheelCommand, parse_code,
 };
 
 use crate::sample::{original, packet};
@@ -33,7 +33,7 @@ fn the_conversion_table_is_the_agreed_one() {
         assert_eq!(command.firmware().code(), code);
     }
     assert_eq!(
-        OperatorCommand::Right.firmware(),
+        OperatorCommand::Right(Speed::Full).firmware(),
         Command::Wheel(WheelCommand::ManualRight)
     );
     assert_eq!(
@@ -55,6 +55,33 @@ fn the_conversion_is_injective_and_gives_no_quarter_turn_and_no_drop() {
 }
 
 #[test]
+fn the_speed_is_the_high_nibble_of_what_a_person_holds() {
+    let speeds = [(Speed::Full, 0), (Speed::Slow, 0x10), (Speed::Middle, 0x20)];
+    for command in OperatorCommand::ALL {
+        assert_eq!(command.speed(), Speed::Full);
+        let full = command.firmware();
+        for (speed, high) in speeds {
+            assert_eq!(Speed::from_word(speed.as_str()), Some(speed));
+            let Some(slower) = command.at(speed) else {
+                assert!(![2, 4, 6, 7].contains(&command.code()), "{command:?}");
+                continue;
+            };
+            assert_eq!(
+                (slower.code(), slower.name()),
+                (command.code(), command.name())
+            );
+            assert_eq!(slower.speed(), speed);
+            assert_eq!(slower.firmware().code(), full.code() | high, "{slower:?}");
+            let (Command::Wheel(wheel), Command::Wheel(full)) = (slower.firmware(), full) else {
+                panic!("it moves the wheels: {slower:?}");
+            };
+            assert_eq!((wheel.at_full(), wheel.speed()), (full, speed));
+            assert!(!wheel.is_one_shot());
+        }
+    }
+}
+
+#[test]
 fn undefined_codes_are_no_commands() {
     let operator: Vec<u8> = (0..=u8::MAX)
         .filter(|code| OperatorCommand::from_code(*code).is_some())
@@ -62,8 +89,10 @@ fn undefined_codes_are_no_commands() {
     let firmware: Vec<u8> = (0..=u8::MAX)
         .filter(|code| Command::from_code(*code).is_some())
         .collect();
+    let slower = [0x12, 0x14, 0x16, 0x19, 0x22, 0x24, 0x26, 0x29];
     assert_eq!(operator, (1..=9).chain(0xF1..=0xFA).collect::<Vec<u8>>());
-    assert_eq!(firmware, (1..=11).chain(0xF1..=0xFB).collect::<Vec<u8>>());
+    let wheels = (1..=11).chain(slower);
+    assert_eq!(firmware, wheels.chain(0xF1..=0xFB).collect::<Vec<u8>>());
     for code in firmware {
         assert_eq!(Command::from_code(code).unwrap().code(), code);
     }

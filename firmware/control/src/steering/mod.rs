@@ -333,6 +333,7 @@ impl SteeringUnit {
         };
         self.motors = Some(motors);
         let at_pins = self.supply.at_pins(motors, self.round);
+        let at_pins = self.wheels.pulses().at_pins(at_pins);
         if self.at_pins != Some(at_pins) {
             self.at_pins = Some(at_pins);
             board.set_motors(at_pins.0, at_pins.1);

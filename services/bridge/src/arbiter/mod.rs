@@ -32,7 +32,8 @@
 //!   [`UNHEARD`](lager_orders::lease::UNHEARD), every order that moves something ends, and no
 //!   origin may move anything. An original board does not report and has no limit on a command's
 //!   age. So it gets only standby, unless the configuration accepts the risk
-//!   ([`Arbiter::drive_original_boards`]).
+//!   ([`Arbiter::drive_original_boards`]), and then no order slower than full speed: it does not know
+//!   those codes, and a person who asks for less speed must not get more.
 //! * **The newest order takes over**, as in the board's command register (T2). A one-shot that is
 //!   replaced while it runs counts as aborted. The external computer queues commands (C5), not the
 //!   bridge.
@@ -66,7 +67,7 @@ use core::time::Duration;
 
 use lager_orders::Mode;
 use lager_topics::Refusal;
-use lager_wire::{Command, SteerCommand, Version, WheelCommand};
+use lager_wire::{Command, Speed, SteerCommand, Version, WheelCommand};
 
 use driven::Driven;
 use lease::Lease;
@@ -366,6 +367,11 @@ impl Arbiter {
 
 /// The command that moves nothing.
 const STANDBY: Command = Command::Wheel(WheelCommand::Standby);
+
+/// Whether a command drives slower than an original board can.
+fn is_slower(command: Command) -> bool {
+    matches!(command, Command::Wheel(wheel) if wheel.speed() != Speed::Full)
+}
 
 /// Whether a command turns the wheels.
 fn moves(command: Command) -> bool {

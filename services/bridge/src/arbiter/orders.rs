@@ -9,12 +9,12 @@ use core::time::Duration;
 use lager_orders::Mode;
 use lager_orders::lease::LATEST_MOVE;
 use lager_topics::{Finish, Origin, Refusal, SteeringOrder};
-use lager_wire::{ArmCommand, Command, WheelCommand};
+use lager_wire::{ArmCommand, Command, Version, WheelCommand};
 
 use super::lease::Lease;
 use super::ledger::{Ended, OrderKey};
 use super::verdict::Verdict;
-use super::{Arbiter, ArmGate, Grant, Running, STANDBY, moves};
+use super::{Arbiter, ArmGate, Grant, Running, STANDBY, is_slower, moves};
 
 impl Arbiter {
     /// Takes one order that its origin sent at `sent` (robot time, at most the present). `age`
@@ -131,6 +131,8 @@ impl Arbiter {
             Refusal::Stale
         } else if let Some(why) = board {
             why
+        } else if self.board == Some(Version::Original) && is_slower(command) {
+            Refusal::FullSpeedOnly
         } else if is_arm && self.running.is_some_and(|running| moves(running.command)) {
             return Some(self.refuse(key, Refusal::ArmLocked));
         } else if is_arm && self.arm == ArmGate::Shut {

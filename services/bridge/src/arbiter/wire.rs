@@ -14,7 +14,7 @@ use lager_wire::{
 
 use super::lease::Lease;
 use super::ledger::OrderKey;
-use super::{Arbiter, ArmGate, Running, STANDBY, Search, moves};
+use super::{Arbiter, ArmGate, Running, STANDBY, Search, is_slower, moves};
 
 /// How long the wheels are in standby on the wire before an arm command follows. The board unlocks
 /// its arm only in standby (T4), and one pass of its loop must have seen the standby.
@@ -40,7 +40,9 @@ impl Arbiter {
     /// is not written again: the arbiter looks for it in the board's reports, and aborts it if it
     /// is not there.
     pub fn board_up(&mut self, now: Duration, version: Version, rebooted: bool) {
-        let ends = self.ends_with_the_link(rebooted);
+        let is_unknown =
+            |running: Running| version == Version::Original && is_slower(running.command);
+        let ends = self.ends_with_the_link(rebooted) || self.running.is_some_and(is_unknown);
         self.has_met_board = true;
         self.board = Some(version);
         self.reported = Some(now);

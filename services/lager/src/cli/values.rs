@@ -10,13 +10,14 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use anyhow::Context as _;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Command};
 use lager_home::UnitName;
 use lager_lines::{Called, Name};
 use lager_orders::{Mode, Pick};
 use lager_topics::TOPICS;
-use lager_wire::{OperatorCommand, parse_code};
+use lager_wire::{OperatorCommand, Speed, parse_code};
 
 pub use crate::address::{calls, listens};
 use crate::config::{BAUD_RATES, SPEEDS};
@@ -83,6 +84,23 @@ pub fn mode() -> impl TypedValueParser<Value = Mode> {
         PossibleValue::new("autonomous").help("Logic steers"),
     ])
     .try_map(|word| Mode::from_word(&word).ok_or("no mode"))
+}
+
+/// How fast to drive, by its word.
+pub fn driving_speed() -> impl TypedValueParser<Value = Speed> {
+    PossibleValuesParser::new(["slow", "middle", "full"])
+        .try_map(|word| Speed::from_word(&word).ok_or("no speed"))
+}
+
+/// A command at the speed that was asked for.
+pub fn at_speed(command: OperatorCommand, speed: Option<Speed>) -> anyhow::Result<OperatorCommand> {
+    let Some(speed) = speed else {
+        return Ok(command);
+    };
+    command.at(speed).with_context(|| {
+        let name = command.name();
+        format!("`{name}` has no --speed; forward, backward, left and right have one")
+    })
 }
 
 /// Who picks the goods up, by its word.
@@ -387,6 +405,10 @@ mod tests {
                 "`abc` is not a number: give a time",
             ),
             (&["drive", "forwrad"], "did you mean `forward`?"),
+            (
+                &["drive", "forward", "--speed", "0.5"],
+                "slow, middle, full",
+            ),
             (&["arm", "sqeeze"], "did you mean `squeeze`?"),
             (
                 &["gains", "-1", "2"],

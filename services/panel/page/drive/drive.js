@@ -3,6 +3,8 @@
 //   key, finger or stick down --> armed, driver, fresh state? --> "drive code" every 50 ms
 //   up, blur, hidden, cancel, menu, lost link, stale state ----> "drive 1" once, then silence
 //
+// What goes straight or turns says its speed with each command; following the line has one of its own.
+//
 // Of two that are held the newer one counts, and when it is let go the older one again. Whatever
 // else ends a hold ends both.
 //
@@ -16,6 +18,7 @@
 
 import { Pads } from "./pads.js";
 import { drawSticks } from "./sticks.js";
+import { Speed } from "./speed.js";
 import { reason } from "../words/sentences.js";
 import { isText } from "../bar/stop.js";
 import { say } from "../words/words.js";
@@ -55,6 +58,18 @@ const ONCE = [
 ];
 /** The buttons of the wheels, row by row. */
 const PAD = ["left_diag", "forward", "right_diag", "left", "stand", "right", "follow_back", "backward", "follow_forward"];
+/** The codes that have a speed. */
+const PACED = [2, 4, 6, 7];
+/**
+ * The speeds, the slowest first: what a command says, its word and its keys.
+ *
+ * @type {[string, string, string[]][]}
+ */
+const SPEEDS = [
+  ["slow", "slow", ["c"]],
+  ["middle", "middle", ["d"]],
+  ["full", "full_speed", ["e"]],
+];
 /**
  * One step of the arm: its code, word and keys.
  *
@@ -86,14 +101,14 @@ const SIGNS = { ArrowUp: "\u2191", ArrowDown: "\u2193", ArrowLeft: "\u2190", Arr
  * @type {Record<"wheels" | "arm", [string, string][]>}
  */
 export const KEYS = {
-  wheels: [...HELD, ...ONCE].flatMap(([, word, [key]]) => (key ? [[SIGNS[key] ?? key, word]] : [])),
+  wheels: [...HELD, ...ONCE, ...SPEEDS].flatMap(([, word, [key]]) => (key ? [[SIGNS[key] ?? key, word]] : [])),
   arm: STEPS.map(([, word, keys]) => [keys.join(" "), word]),
 };
 
 export class Driving {
   /**
    * @param {Link} link
-   * @param {{ armed: HTMLInputElement, sticks: SVGElement } & Record<"said" | "pad" | "arm" | "resume", HTMLElement>} parts
+   * @param {{ armed: HTMLInputElement, sticks: SVGElement } & Record<"said" | "pad" | "speed" | "arm" | "resume", HTMLElement>} parts
    * @param {() => Robot | null} robot
    * @param {() => number} now
    */
@@ -130,6 +145,10 @@ export class Driving {
      */
     this.padCode = null;
     this.gamepads = new Pads(now);
+    /** @type {Map<string, HTMLElement>} */
+    const speeds = new Map();
+    for (const [step, word, keys] of SPEEDS) speeds.set(step, addButton(parts.speed, word, keys, `speed ${step}`));
+    this.speed = new Speed(speeds, () => this.paced());
     this.buttons();
     this.keys();
     this.releases();
@@ -209,6 +228,14 @@ export class Driving {
     for (const button of this.parts.pad.children) button.classList.toggle("down", codes.includes(button.getAttribute("data-action") ?? ""));
   }
 
+  /** Another speed was chosen: what is held goes on at that one. */
+  paced() {
+    if (!this.held) return;
+    // It is another command to the robot: what it says of the one before ends nothing.
+    this.held = { ...this.held };
+    this.renew();
+  }
+
   async renew() {
     if (this.held?.source === "pad") this.pads();
     if (!this.held) return;
@@ -217,7 +244,7 @@ export class Driving {
     if (why || robot !== this.robot()) return this.letGo(...(why ?? []));
     if (this.link.backlog > BACKLOG) return this.letGo("full");
     const held = this.held;
-    const answer = await this.link.act(robot, `drive ${code}`);
+    const answer = await this.link.act(robot, `drive ${code}${PACED.includes(code) ? this.speed.said : ""}`);
     // What was let go meanwhile has its own end.
     if (answer.refused && this.held === held) {
       this.letGo();
@@ -341,7 +368,8 @@ export class Driving {
       const once = find(ONCE, event.key);
       // The keypad's division sign is a slash to most layouts.
       const step = find(STEPS, event.code === "NumpadDivide" ? "\u00f7" : event.key.toLowerCase());
-      if (!held && !once && !step) return;
+      const pace = find(SPEEDS, event.key.toLowerCase());
+      if (!held && !once && !step && !pace) return;
       // Unarmed, the arrows are the page's.
       if (!this.parts.armed.checked) return;
       event.preventDefault();
@@ -349,6 +377,7 @@ export class Driving {
       if (held) this.hold(held[0], place(event));
       else if (once) this.once(`drive ${once[0]}`);
       else if (step) this.once(`arm ${step[0]}`);
+      else if (pace) this.speed.choose(pace[0]);
     });
     addEventListener("keyup", (event) => this.release(place(event)));
   }
@@ -377,6 +406,7 @@ export class Driving {
     const was = this.padCode;
     this.padCode = this.gamepads.read();
     drawSticks(this.parts.sticks, this.gamepads.axes);
+    this.speed.turn(this.gamepads.turned);
     if (was === this.padCode) return;
     this.release("pad");
     if (this.padCode) this.hold(this.padCode, "pad");

@@ -18,7 +18,10 @@ const FROZEN_MS = 300;
 /** How far a stick is bent that says something. */
 const BENT = 0.5;
 
-/** @typedef {{ id: string, came: number, since: number, rested: boolean }} Known What is known of an entry. */
+/** The buttons at the left and at the right shoulder: slower and faster. */
+const [SLOWER, FASTER] = [4, 5];
+
+/** @typedef {{ id: string, came: number, since: number, rested: boolean, shoulder: number }} Known What is known of an entry. */
 /** @typedef {{ pad: Gamepad, index: number }} There An entry and its place in the browser's list. */
 
 
@@ -45,6 +48,15 @@ function code({ axes, buttons }) {
   return found?.[0] ?? null;
 }
 
+/**
+ * The way in which an entry's shoulder buttons turn the speed.
+ *
+ * @param {Pick<Gamepad, "buttons">} pad
+ */
+function shoulder({ buttons }) {
+  return Number(buttons[FASTER]?.pressed ?? false) - Number(buttons[SLOWER]?.pressed ?? false);
+}
+
 export class Pads {
   /** @param {() => number} now */
   constructor(now) {
@@ -69,6 +81,8 @@ export class Pads {
      * @type {number | null}
      */
     this.speaks = null;
+    /** The way in which the speed was turned at the last reading: 1, -1 or 0. A press counts once. */
+    this.turned = 0;
     addEventListener("gamepadconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
     addEventListener("gamepaddisconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
   }
@@ -96,6 +110,14 @@ export class Pads {
     for (const { pad, index } of there) this.meet(pad, index);
     const newest = Math.max(...there.map(({ pad }) => pad.timestamp ?? 0));
     const counts = there.filter(({ pad, index }) => this.isBelieved(pad, index, newest, there));
+    this.turned = 0;
+    for (const { pad, index } of there) {
+      const known = this.known.get(index);
+      const way = shoulder(pad);
+      if (!known || known.shoulder === way) continue;
+      known.shoulder = way;
+      if (counts.some((one) => one.index === index)) this.turned = way;
+    }
     // Who speaks goes on speaking; another pad does not talk into it.
     const speaker = counts.find(({ index }) => index === this.speaks) ?? counts.find(({ pad }) => code(pad));
     this.axes = (speaker ?? counts[0] ?? there[0])?.pad.axes ?? null;
@@ -113,7 +135,7 @@ export class Pads {
   meet(pad, index) {
     let known = this.known.get(index);
     if (!known || known.id !== pad.id) {
-      known = { id: pad.id, came: ++this.came, since: this.now(), rested: false };
+      known = { id: pad.id, came: ++this.came, since: this.now(), rested: false, shoulder: shoulder(pad) };
       this.known.set(index, known);
     }
     const isLookedAt = this.now() - known.since > COME_MS && this.now() - this.since > LOOK_MS;

@@ -91,6 +91,51 @@ fn a_full_and_an_empty_battery_drive_at_nearly_the_same_speed() {
 }
 
 #[test]
+fn a_person_drives_every_robot_at_three_speeds_on_any_battery() {
+    let mm_per_s = |seed, charge, command| {
+        let mut pi = varied(&without_goods(Node::new(1, 1), 400), seed);
+        pi.robot.world_mut().set_battery_charge(charge);
+        pi.place(1_000.0, 0.0, 0.0);
+        pi.wheels(command);
+        pi.run(ms(500));
+        let from = pi.pose();
+        pi.run(ms(4_000));
+        let to = pi.pose();
+        (to.x - from.x).hypot(to.y - from.y) / 4.0
+    };
+    let mut least = [f64::MAX; 3];
+    let mut most = [0.0_f64; 3];
+    for seed in 1..=20 {
+        for charge in [1.0, 0.08] {
+            for ways in [
+                [
+                    WheelCommand::SlowForward,
+                    WheelCommand::MiddleForward,
+                    WheelCommand::ManualForward,
+                ],
+                [
+                    WheelCommand::SlowBackward,
+                    WheelCommand::MiddleBackward,
+                    WheelCommand::ManualBackward,
+                ],
+            ] {
+                let speeds = ways.map(|command| mm_per_s(seed, charge, command));
+                for (index, speed) in speeds.into_iter().enumerate() {
+                    least[index] = least[index].min(speed);
+                    most[index] = most[index].max(speed);
+                }
+                let [slow, middle, full] = speeds;
+                let part = |speed: f64, part: f64| (speed / full / part - 1.0).abs() < 0.15;
+                assert!(part(slow, 0.25), "seed {seed}: {slow} of {full}");
+                assert!(part(middle, 0.5), "seed {seed}: {middle} of {full}");
+            }
+        }
+    }
+    println!("slow, middle, full: {least:.0?} to {most:.0?} mm/s");
+    assert!(least[0] > 10.0, "{least:?}");
+}
+
+#[test]
 fn a_body_that_is_driven_into_an_obstacle_stops_and_is_counted() {
     let mut warehouse = without_goods(Node::new(2, 1), 60);
     warehouse.obstacles.push(Obstacle {

@@ -7,7 +7,7 @@ use lager_lines::Name;
 use lager_lines::command::{read_arm, read_wheels};
 use lager_orders::{Action, Mode, Wheels};
 use lager_station::{ActRefused, Output, Peer, Reply, Saying, Station, Wish, WishRefused};
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 
 use crate::transcript::warehouse;
 
@@ -191,7 +191,7 @@ fn one_drives_and_the_next_is_refused_with_his_name() {
         Err(ActRefused::NotDriver.into())
     );
     station.heard(LINK, Ok("styrcomm"));
-    let refused = station.wish(&r1(), Wish::Command(OperatorCommand::Forward));
+    let refused = station.wish(&r1(), Wish::Command(OperatorCommand::Forward(Speed::Full)));
     assert!(matches!(
         refused,
         Err(WishRefused::Act(ActRefused::Driven { .. }))

@@ -2,7 +2,7 @@
 
 use lager_lines::Name;
 use lager_station::{Output, Peer, Robot, Station, Wish, WishRefused};
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Speed};
 
 use crate::transcript::{product, warehouse};
 
@@ -458,7 +458,7 @@ fn a_command_that_nobody_asks_for_is_refused() {
     let mut station = station();
     station.connected(R1);
     play(&mut station, &[(R1, "fetchprod", &[])]);
-    let forward = Wish::Command(OperatorCommand::Forward);
+    let forward = Wish::Command(OperatorCommand::Forward(Speed::Full));
     let refused = station.wish(&name("robot-1"), forward).unwrap_err();
     assert!(
         refused.to_string().contains("takes no commands now"),

@@ -145,6 +145,44 @@ fn an_original_board_is_told_each_moving_command_once_and_standby_again_and_agai
 }
 
 #[test]
+fn an_original_board_is_never_driven_faster_than_a_person_asks() {
+    let slow = Command::Wheel(WheelCommand::SlowForward);
+    let mut bench = with_original_board(Mode::Manual, true);
+    let refused = bench.give(drive(Origin::Operator, 1, slow));
+    assert_eq!(refused, Verdict::Refused(Refusal::FullSpeedOnly));
+    bench.run(500);
+    assert!(
+        bench
+            .written
+            .iter()
+            .all(|(_, command)| command.command() == Some(STANDBY))
+    );
+    // At full speed the person drives it.
+    let given = bench.give(drive(Origin::Operator, 2, FORWARD));
+    assert_eq!(given, Verdict::Executes);
+    // The same order cannot become slower or faster under way.
+    let changed = bench.give(drive(Origin::Operator, 2, slow));
+    assert_eq!(changed, Verdict::Refused(Refusal::CodeChanged));
+
+    // An order that an earlier bridge gave to another board ends, too.
+    let mut bench = Bench::manual();
+    bench.give(drive(Origin::Operator, 1, slow));
+    bench.run(20);
+    bench.arbiter = Arbiter::resume(&bench.health(), bench.now);
+    bench.arbiter.drive_original_boards(true);
+    bench.arbiter.board_up(bench.now, Version::Original, false);
+    bench.written.clear();
+    bench.run_renewed(200, drive(Origin::Operator, 1, slow));
+    assert_eq!(bench.ended(), Some((Origin::Operator, 1, Finish::Aborted)));
+    assert!(
+        bench
+            .written
+            .iter()
+            .all(|(_, command)| command.command() == Some(STANDBY))
+    );
+}
+
+#[test]
 fn an_original_board_is_told_standby_only_unless_that_was_accepted() {
     let mut bench = with_original_board(Mode::Manual, false);
     assert_eq!(

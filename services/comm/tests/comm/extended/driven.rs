@@ -36,6 +36,32 @@ fn a_drive_holds_as_long_as_it_is_renewed() {
 }
 
 #[test]
+fn a_drive_has_the_speed_that_it_says_and_a_renewal_keeps_it() {
+    let mut robot = extended(Mode::Manual);
+    let steered = |robot: &Robot| robot.steered.map(|(_, code)| code);
+    // 0x12 is slowly forward to the board.
+    assert_eq!(robot.hears(&["do 1 drive 2 slow 150"]), ["[steers 18]"]);
+    assert_eq!(in_force(&mut robot), ["done 1"]);
+    assert_eq!(pass(&mut robot, 100), [""; 0]);
+    assert_eq!(robot.hears(&["do 2 drive 2 slow 150"]), [""; 0]);
+    assert_eq!(in_force(&mut robot), ["done 2"]);
+    assert_eq!(pass(&mut robot, 100), [""; 0]);
+    assert_eq!(steered(&robot), Some(0x12), "what was renewed");
+    // Another speed is another command, and none is left over from the one before.
+    assert_eq!(robot.hears(&["do 3 drive 2 middle 150"]), ["[steers 34]"]);
+    assert_eq!(
+        robot.hears(&["do 4 drive 2 150"]),
+        [
+            "[steers 2]",
+            "refused 3 another command has taken its place"
+        ]
+    );
+    assert_eq!(in_force(&mut robot), ["done 4"]);
+    let said = pass(&mut robot, 150);
+    assert_eq!(said[0], "[steers 1]", "its time is over");
+}
+
+#[test]
 fn a_drive_ends_with_the_link_and_is_refused_where_logic_steers() {
     let mut robot = extended(Mode::Manual);
     robot.hears(&["do 1 drive 2 1000"]);
