@@ -77,7 +77,7 @@ fn goods_that_share_a_square_are_read_and_each_is_ordered_where_there_is_no_room
         "document.querySelector('#map [data-product=\"1 2 12\"].queued:not(.gone)') !== null",
     );
     assert_eq!(number(&mut page, "1 2 12"), "×1");
-    robot.says(&[STATE, "gone 3 1 2 12"]);
+    robot.says(&[STATE, "queue 0", "gone 3 1 2 12"]);
     page.wait_until(
         "document.querySelector('#map [data-product=\"1 2 12\"].gone:not(.queued)') !== null",
     );
