@@ -74,7 +74,7 @@ const WORDS = {
     search: "Fetch: number or name", search_none: "no goods are called so", search_one: "Enter fetches {0}", search_many: "several goods match: {0}",
     in_minutes: "{0} min", battery_alarm: "The battery is nearly empty: {0}",
     past_open: "{0} delivered today", past_close: "Back to the orders", past_goods: "all goods", past_time: "since when", past_day: "the last 24 hours", past_today: "today", past_totals: "Delivered: {0} today, {1} in the last 24 hours",
-    speed: "Speed of the arrows", slow: "slow", middle: "middle", full_speed: "full",
+    speed: "Speed", speed_how: "speed of the arrows; following the line and turns of 45° have their own", slow: "slow", middle: "middle", full_speed: "full",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -146,7 +146,7 @@ const WORDS = {
     search: "Hämta: nummer eller namn", search_none: "ingen vara heter så", search_one: "Enter hämtar {0}", search_many: "flera varor passar: {0}",
     in_minutes: "{0} min", battery_alarm: "Batteriet är nästan tomt: {0}",
     past_open: "{0} levererade i dag", past_close: "Tillbaka till ordrarna", past_goods: "alla varor", past_time: "sedan när", past_day: "de senaste 24 timmarna", past_today: "i dag", past_totals: "Levererat: {0} i dag, {1} de senaste 24 timmarna",
-    speed: "Pilarnas fart", slow: "sakta", middle: "halv", full_speed: "full",
+    speed: "Fart", speed_how: "pilarnas fart; att följa linjen och att vända 45° har sin egen", slow: "sakta", middle: "halv", full_speed: "full",
   },
 };
 
