@@ -80,7 +80,7 @@ fn mm_per_s(scene: &mut Scene, page: &mut Page, key: &str) -> f64 {
     const SPAN_NS: u64 = 1_500_000_000;
     let speed = wait_for("a hold that nothing ends", || {
         scene.hold(page, key);
-        let mut from: Option<(u64, f32, f32)> = None;
+        let mut from: Option<(u64, f64, f64)> = None;
         let (ns, way) = wait_for("the way", || {
             let truth = scene.truth.latest().expect("readable")?;
             let (began, x, y) = *from.get_or_insert((truth.time_ns, truth.x_mm, truth.y_mm));
@@ -90,7 +90,7 @@ fn mm_per_s(scene: &mut Scene, page: &mut Page, key: &str) -> f64 {
         });
         let is_held = page.text("#drive-said").is_empty();
         page.key_up(key);
-        is_held.then_some(f64::from(way) / (ns as f64 / 1e9))
+        is_held.then_some(way / (ns as f64 / 1e9))
     });
     scene.wait_to_stand();
     speed

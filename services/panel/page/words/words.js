@@ -109,7 +109,7 @@ const WORDS = {
     renew_drops: "Orders that do not fit any more are dropped: goods {0}.", renew_yes: "Stop it and put it there", renew_no: "Leave it where it is",
     renews: "{0} is stopped and put into the saved warehouse; hold Resume to let it move.",
     tip_stack: "square {0}: {1}", does_choose: "choose one of them", legend_stack: "several goods; a click lists them",
-    speed: "Speed of the arrows", slow: "slow", middle: "middle", full_speed: "full",
+    speed: "Speed", speed_how: "speed of the arrows; following the line and turns of 45° have their own", slow: "slow", middle: "middle", full_speed: "full",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -216,7 +216,7 @@ const WORDS = {
     renew_drops: "Order som inte passar längre stryks: vara {0}.", renew_yes: "Stoppa den och ställ den där", renew_no: "Låt den vara",
     renews: "{0} stoppas och ställs i det sparade lagret; håll Fortsätt för att låta den röra sig.",
     tip_stack: "ruta {0}: {1}", does_choose: "välj en av dem", legend_stack: "flera varor; ett klick listar dem",
-    speed: "Pilarnas fart", slow: "sakta", middle: "halv", full_speed: "full",
+    speed: "Fart", speed_how: "pilarnas fart; att följa linjen och att vända 45° har sin egen", slow: "sakta", middle: "halv", full_speed: "full",
   },
 };
 
