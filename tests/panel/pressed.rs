@@ -91,11 +91,12 @@ pub(crate) fn stop_is_never_off_and_claims_nothing_while_the_station_is_away(
     let station = pid(scene.up.service("station").expect("it runs"));
     kill_process(station, Signal::KILL).expect("it runs");
     page.wait_for("#state", "no connection to the station");
-    for press_stop in [(|page| page.click("#stop")) as fn(&mut Page), |page| {
-        press_key(page, "Escape")
-    }] {
+    for is_key in [false, true] {
         page.value("told.splice(0)");
-        press_stop(page);
+        match is_key {
+            true => press_key(page, "Escape"),
+            false => page.click("#stop"),
+        }
         page.wait_until("told.at(-1) === 'NOT SENT: there is no connection to the station'");
     }
     drop(frozen);
@@ -246,8 +247,10 @@ const OPENERS: &[Opener] = &[
     ),
 ];
 
-/// The ways to press STOP.
-const STOPS: [(&str, fn(&mut Page)); 3] = [
+/// A way to press STOP, and its name.
+type Press = (&'static str, fn(&mut Page));
+
+const STOPS: [Press; 3] = [
     ("click", |page| {
         let at = page.middle("#stop");
         page.click_at(at);
@@ -284,7 +287,7 @@ const WATCH_FORMS: &str = "window.posts = []; (() => { const { fetch } = window;
 const STOPPED: &str = "sent.filter((line) => line.startsWith('stop ')).length + posts.length";
 
 /// Presses STOP, which is one stop.
-fn press_once(page: &mut Page, (way, press): (&str, fn(&mut Page)), name: &str) {
+fn press_once(page: &mut Page, (way, press): Press, name: &str) {
     page.value("sent.splice(0); posts.splice(0)");
     press(page);
     page.wait_until(&format!("{STOPPED} > 0"));
@@ -361,8 +364,12 @@ pub(crate) fn resume_ends_the_stop_or_says_why_not_each_time_that_it_is_held(
         page.wait_until(IS_ANSWERED);
         let is_over = page.value("document.body.dataset.look") != "stopped";
         if !is_over {
-            scene.resume();
-            page.wait_until("document.body.dataset.look !== 'stopped'");
+            // A stop that nobody has confirmed for a second was given again.
+            wait_for("the stop to be over", || {
+                let _ = scene.domain.run(&["resume"]);
+                page.pause();
+                (page.value("document.body.dataset.look") != "stopped").then_some(())
+            });
         }
         resumed += u32::from(is_over);
         is_over
