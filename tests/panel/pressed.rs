@@ -342,6 +342,7 @@ fn stop_is_one_press_and_on_top_whatever_else_is_open() {
         page.value(close);
         page.mouse("mouseMoved", (3.0, 3.0));
     }
+    scene.resume();
     drop((page, other));
     scene.end();
 }
