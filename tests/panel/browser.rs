@@ -107,7 +107,11 @@ impl Browser {
             .set_read_timeout(Some(lager_tests::WATCHDOG))
             .expect("a socket");
         let (socket, _) = tungstenite::client(at, stream).expect("a page's socket");
-        let mut page = Page { socket, number: 0 };
+        let mut page = Page {
+            socket,
+            number: 0,
+            paused: Vec::new(),
+        };
         page.call("Page.enable", &json!({}));
         // Several pages may be open, and each behaves as if it were in front.
         page.call(
@@ -138,6 +142,8 @@ impl Drop for Browser {
 pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
     number: u64,
+    /// Requests of the page that wait for what a test does with them (`Fetch.enable`).
+    paused: Vec<String>,
 }
 
 impl Page {
@@ -155,10 +161,7 @@ impl Page {
             .send(Message::text(call.to_string()))
             .expect("a page that listens");
         loop {
-            let Message::Text(text) = self.socket.read().expect("a page that answers") else {
-                continue;
-            };
-            let said: Value = serde_json::from_str(&text).expect("JSON");
+            let said = self.read();
             if said["id"] == number {
                 // The answer is lost with the page that gave it.
                 let message = said["error"]["message"].as_str().unwrap_or_default();
@@ -168,6 +171,35 @@ impl Page {
                 assert!(said["error"].is_null(), "{method}: {said}");
                 return said["result"].clone();
             }
+        }
+    }
+
+    /// The next thing that the browser says.
+    fn read(&mut self) -> Value {
+        loop {
+            let Message::Text(text) = self.socket.read().expect("a page that answers") else {
+                continue;
+            };
+            let said: Value = serde_json::from_str(&text).expect("JSON");
+            if said["method"] == "Fetch.requestPaused" {
+                let id = said["params"]["requestId"].as_str().expect("a request");
+                self.paused.push(id.to_owned());
+            }
+            return said;
+        }
+    }
+
+    /// Answers the page's next request that waits with this status and nothing else, or not at all.
+    pub(crate) fn answer_next(&mut self, status: Option<u32>) {
+        let id = loop {
+            match self.paused.pop() {
+                Some(id) => break id,
+                None => drop(self.read()),
+            }
+        };
+        if let Some(status) = status {
+            let params = json!({ "requestId": id, "responseCode": status });
+            self.call("Fetch.fulfillRequest", &params);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Tests of the operator panel in a real browser, with a simulated robot: it stands after every
 //! kind of release, a stop is confirmed, goods are fetched, two people do not drive at once.
 
+mod away;
 mod browser;
 mod driving;
 mod editing;
@@ -13,6 +14,7 @@ mod missions;
 mod needs;
 mod pictures;
 mod played;
+mod pressed;
 mod reasons;
 mod releases;
 mod scene;
@@ -106,6 +108,15 @@ each_alone! {
     health::the_theme_survives_a_reload_and_is_the_display_s_too,
     health::what_drives_is_shown_as_pressed,
     health::a_person_s_name_is_at_the_wheel_and_at_the_stop,
+    away::a_hidden_page_lets_go_sends_nothing_on_its_return_and_shows_what_is_now,
+    away::after_a_silence_the_first_pose_that_is_drawn_is_the_newest,
+    away::a_page_that_looks_on_only_says_that_it_is_there_and_a_closed_tab_ends_its_hold,
+    pressed::stop_is_never_off_and_claims_nothing_while_the_station_is_away,
+    pressed::resume_ends_the_stop_or_says_why_not_each_time_that_it_is_held,
+    pressed::a_field_keeps_what_is_typed_and_a_clicked_button_is_not_pressed_by_driving,
+    pressed::enter_held_on_a_tile_and_in_the_field_orders_once,
+    pressed::a_robot_on_its_way_is_not_calibrated_and_the_page_says_why,
+    pressed::a_page_without_its_script_or_of_another_version_drives_nothing_and_stops,
     releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
 }
 
