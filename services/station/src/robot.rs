@@ -16,7 +16,8 @@
 //!   when it stands at goods. At most [`Robot::MOST_COMMANDS`] wait.
 //! - A stop replaces all commands that wait, and also a `pickup_done` behind them, because the
 //!   robot would drive off after it. If the robot speaks the extension, the station sends it the
-//!   stop at once, even while the robot turns and asks nothing.
+//!   stop at once, even while the robot turns and asks nothing. A stop that the robot has not
+//!   confirmed when its connection ends is given to its next connection, within [`KEPT`].
 //! - The station drops the commands that wait when the robot asks for something else, when its
 //!   connection ends, and when somebody takes its wheel. So no old command moves the robot later.
 //! - A product leaves the queue when the station tells it to the robot. If the connection ends
@@ -51,6 +52,9 @@ use crate::wheel::Wheel;
 
 mod actions;
 mod known;
+
+/// How long after a stop that the robot has not confirmed its next connection is given it.
+const KEPT: Duration = Duration::from_secs(5);
 
 pub(crate) use known::Other;
 
@@ -213,6 +217,8 @@ pub struct Robot {
     now: Duration,
     shown: Shown,
     asked: Asked,
+    /// The number of the last stop, and when a person gave it, until the robot has confirmed it.
+    unconfirmed: Option<(u32, Duration)>,
     wheel: Wheel,
     /// What the robot has said, until somebody takes it.
     told_news: Vec<Saying>,
@@ -274,6 +280,7 @@ impl Robot {
         self.drop_commands();
         let (number, dropped) = self.asked.open_always(self.now);
         self.lose(dropped);
+        self.unconfirmed = Some((number, self.now));
         let number = Some(number);
         Ok((number, Some(StationLine::Order(Order::Stop { number }))))
     }
@@ -420,12 +427,19 @@ impl Robot {
                 Telemetry::Robot(node) => self.node = Some(node),
                 Telemetry::Heading(looks) => self.looks = Some(looks),
             },
-            RobotLine::Hello(hello) => self.hello = Some(hello),
+            RobotLine::Hello(hello) => {
+                if self.hello.replace(hello).is_none() {
+                    return self.stop_again();
+                }
+            }
             RobotLine::Report(report) => {
                 let told = self.shown.take(report, self.now);
                 self.told_news.extend(told.filter(|told| match told {
                     // An answer that nobody waits for is no news.
-                    Saying::Replied { number, .. } => self.asked.close(*number),
+                    Saying::Replied { number, .. } => {
+                        self.unconfirmed.take_if(|(stop, _)| stop == number);
+                        self.asked.close(*number)
+                    }
                     Saying::Event(_)
                     | Saying::Thinks(_)
                     | Saying::Because(_)
@@ -436,6 +450,13 @@ impl Robot {
             }
         }
         None
+    }
+
+    /// The connection on which the last stop was given may have been dead already.
+    fn stop_again(&mut self) -> Option<StationLine> {
+        let (_, given) = self.unconfirmed.take()?;
+        let is_meant = self.now.saturating_sub(given) <= KEPT;
+        is_meant.then(|| self.stop().ok()?.1).flatten()
     }
 
     /// Whether people get this as news.

@@ -58,6 +58,31 @@ fn replies(station: &mut Station) -> Vec<(u32, Reply)> {
 }
 
 #[test]
+fn a_stop_that_a_dead_connection_got_is_given_to_the_next_one_soon_after() {
+    let again = |confirmed: bool, later: u64| {
+        let mut station = extended();
+        station.turn(at(1_000));
+        station.stop(&r1()).expect("it takes stops");
+        assert_eq!(said(&mut station), ["stop 1"]);
+        if confirmed {
+            station.heard(LINK, Ok("stopped 1 10"));
+        }
+        station.disconnected(LINK);
+        station.turn(at(later));
+        station.connected(Peer::Robot(2));
+        station.heard(Peer::Robot(2), Ok("lager 1 r1"));
+        let said = said(&mut station);
+        // It repeats that line as a sign of life.
+        station.heard(Peer::Robot(2), Ok("lager 1 r1"));
+        said
+    };
+    assert_eq!(again(false, 6_000), ["stop 2", "lager 1 lager"]);
+    let nobody_means_it = again(false, 6_001);
+    assert_eq!(nobody_means_it, ["lager 1 lager"]);
+    assert_eq!(again(true, 1_500), ["lager 1 lager"]);
+}
+
+#[test]
 fn actions_are_numbered_and_each_is_answered_once() {
     let mut station = extended();
     assert_eq!(station.act(&r1(), Action::Mode(Mode::Manual)), Ok(1));

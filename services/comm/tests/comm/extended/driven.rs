@@ -5,6 +5,7 @@ use lager_stop::Stop;
 use lager_topics::{Finish, Outcome, Refusal, Role, StopCause};
 
 use super::{done, ended, extended, in_force, pass};
+use crate::robot::Robot;
 
 #[test]
 fn a_drive_holds_as_long_as_it_is_renewed() {
