@@ -303,15 +303,14 @@ fn a_simulated_robot_is_put_into_the_saved_warehouse_after_a_question_and_stands
     });
     wait_for("what is dropped to be told", || {
         let told = scene.up.output();
-        let is_told = told.contains("the order for product 3 is dropped");
+        let is_told = told.contains("the order for goods 3 is dropped");
         is_told.then_some(())
     });
     page.click("#tab-missions");
     page.wait_for("#queue-said", "Nothing waits.");
     // Goods 9 can be fetched, once a person has released the stop.
     scene.resume();
-    page.fill("#goods", "9");
-    page.click("#fetch button");
+    page.order("9");
     wait_for("it to fetch goods 9", || {
         (status.latest().expect("readable")?.product == 9).then_some(())
     });

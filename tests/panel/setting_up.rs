@@ -430,6 +430,7 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     page.fill("#products [name=x]", "2");
     page.wait_for("#setup-said", "goods 12 stand outside");
     page.fill("#products [name=x]", "1");
+    page.fill("#products [name=y]", "1");
     page.fill("#products [name=name]", "nails");
     page.click("#save");
     page.wait_until(&format!("{goods} === '1,2,3,12'"));

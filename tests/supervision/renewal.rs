@@ -85,7 +85,7 @@ fn a_robot_that_gets_another_world_stands_whatever_happens_meanwhile() {
         ((status.x, status.y) == (2, 0)).then_some(())
     });
     assert!(
-        up.output().contains("the order for product 2 is dropped"),
+        up.output().contains("the order for goods 2 is dropped"),
         "{}",
         up.output()
     );

@@ -330,7 +330,7 @@ impl Robot {
         let dropped = products.map(|products| keeping.keep_only(&products));
         for product in dropped.unwrap_or_default() {
             self.note(&format!(
-                "the order for goods {product} is dropped: it is not in this warehouse"
+                "the order for goods {product} is dropped: they are not in this warehouse"
             ));
         }
         self.happened(Event::Restored)
