@@ -353,6 +353,11 @@ fn an_accessibility_checker_finds_nothing() {
     page.value(&axe);
     for tab in TABS {
         page.click(&format!("#tab-{tab}"));
+        page.wait_until(
+            "(() => { const heads = [...document.querySelectorAll('[role=tabpanel]:not([hidden]) h3')]; \
+             return heads.every(({ textContent }) => textContent) && \
+               (document.body.dataset.view !== 'signals' || heads.length > 0); })()",
+        );
         check(&mut page, tab);
     }
     page.click("#help-open");
