@@ -167,12 +167,9 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
         page.wait_until(&format!("{waiting} === '{queue}'"));
     }
     // A product that already has an order cannot get a second; the page shows the reason there.
-    for product in ["1", "3"] {
+    for (product, why) in [("1", "the robot fetches it"), ("3", "ordered, as number 2")] {
         page.order(product);
-        page.wait_for(
-            "#missions-said",
-            &format!("goods {product} are ordered already"),
-        );
+        page.wait_for("#missions-said", why);
     }
     page.wait_until(&format!("{waiting} === '2,3'"));
     let button = |line: usize, which: usize| {
