@@ -4,6 +4,8 @@
 /** @import { Point, Target } from "./grid.js" */
 /** @import { Offer } from "./offers.js" */
 
+import { beside } from "../parts/beside.js";
+
 /** How far it stays from what it is about, in pixels. */
 const OFF_PX = 16;
 
@@ -35,14 +37,12 @@ export class Stack {
    * @param {Point} pixel the same in pixels
    * @param {{ width: number, height: number }} room
    */
-  open(goods, at, [x, y], { width, height }) {
+  open(goods, at, pixel, room) {
     const { box } = this;
     this.before = document.activeElement;
     box.replaceChildren(...goods.map((id) => this.row(id, at)));
     box.hidden = false;
-    const { offsetWidth: wide, offsetHeight: high } = box;
-    const top = y + OFF_PX + high < height ? y + OFF_PX : Math.max(4, y - OFF_PX - high);
-    Object.assign(box.style, { left: `${Math.round(Math.max(4, Math.min(width - wide - 4, x - wide / 2)))}px`, top: `${Math.round(top)}px` });
+    beside(box, pixel, room, OFF_PX);
     box.querySelector("button")?.focus();
   }
 

@@ -5,6 +5,7 @@
 /** @import { Offer } from "../map/offers.js" */
 /** @import { OnMap } from "./onmap.js" */
 
+import { beside } from "../parts/beside.js";
 import { put } from "../words/words.js";
 import { named } from "./edits.js";
 
@@ -57,12 +58,7 @@ export class Rename {
     put(number, String(id));
     name.value = this.onMap.edits.now?.product?.find((product) => product.id === id)?.name ?? "";
     form.hidden = false;
-    const [x, y] = this.map.pixels(at);
-    const { width, height } = this.map.size;
-    const { offsetWidth: wide, offsetHeight: high } = form;
-    const top = y + OFF_PX + high + 8 < height ? y + OFF_PX : Math.max(4, y - OFF_PX - high);
-    form.style.left = `${Math.round(Math.max(4, Math.min(width - wide - 4, x - wide / 2)))}px`;
-    form.style.top = `${Math.round(top)}px`;
+    beside(form, this.map.pixels(at), this.map.size, OFF_PX);
     name.select();
   }
 
