@@ -8,6 +8,7 @@ mod extended;
 mod full;
 mod gag;
 mod heir;
+mod killed;
 mod late;
 mod lost;
 mod peers;
