@@ -366,7 +366,8 @@ fn figures(entry: &Entry<'_>, latency: Option<[u64; 2]>) -> Vec<Value> {
     COLUMNS.iter().map(figure).collect()
 }
 
-/// A line of the table. A text with a comma stands in quotation marks.
+/// A line of the table. A text with a comma or a quotation mark stands in such marks, and each that
+/// is in it is doubled (RFC 4180).
 fn row(entry: &Entry<'_>, latency: Option<[u64; 2]>) -> String {
     let mut row = format!("{}.{:03}", entry.at_ms / 1_000, entry.at_ms % 1_000);
     for figure in figures(entry, latency) {
@@ -374,7 +375,9 @@ fn row(entry: &Entry<'_>, latency: Option<[u64; 2]>) -> String {
         // Writing to a text cannot fail.
         let _ = match figure {
             Value::Null => Ok(()),
-            Value::String(text) if text.contains(',') => write!(row, "\"{text}\""),
+            Value::String(text) if text.contains([',', '"']) => {
+                write!(row, "\"{}\"", text.replace('"', "\"\""))
+            }
             Value::String(text) => row.write_str(&text),
             number => write!(row, "{number}"),
         };
