@@ -7,6 +7,7 @@ mod driving;
 mod editing;
 mod fleet;
 mod health;
+mod keyboard;
 mod legible;
 mod manners;
 mod map;

@@ -18,6 +18,8 @@ fn stroke(page: &mut Page, kind: &str, key: &str, is_repeat: bool) {
     let (code, text) = match key {
         "Enter" => (13, "\r"),
         " " => (32, " "),
+        "Escape" => (27, ""),
+        "ArrowLeft" => (37, ""),
         "ArrowUp" => (38, ""),
         "ArrowDown" => (40, ""),
         letter => (u32::from(letter.to_ascii_uppercase().as_bytes()[0]), letter),
@@ -35,13 +37,13 @@ fn stroke(page: &mut Page, kind: &str, key: &str, is_repeat: bool) {
     page.call("Input.dispatchKeyEvent", &params);
 }
 
-fn press(page: &mut Page, key: &str) {
+pub(crate) fn press(page: &mut Page, key: &str) {
     stroke(page, "down", key, false);
     stroke(page, "up", key, false);
 }
 
 /// Holds a key for more than a second, which repeats meanwhile.
-fn hold_down(page: &mut Page, key: &str) {
+pub(crate) fn hold_down(page: &mut Page, key: &str) {
     stroke(page, "down", key, false);
     for _ in 0..26 {
         std::thread::sleep(Duration::from_millis(50));
