@@ -1,11 +1,51 @@
 //! A test of the page for who has no pointer: Tab, arrows and Enter reach and do everything.
 
+use std::time::Duration;
+
 use lager_tests::wait_for;
 use serde_json::json;
 
 use crate::Scene;
 use crate::browser::Page;
-use crate::pressed::{hold_down, press};
+
+/// Moves a key as a keyboard does: with what it writes, scrolls and presses.
+pub(crate) fn stroke(page: &mut Page, kind: &str, key: &str, is_repeat: bool) {
+    let (code, text) = match key {
+        "Enter" => (13, "\r"),
+        " " => (32, " "),
+        "Escape" => (27, ""),
+        "ArrowLeft" => (37, ""),
+        "ArrowUp" => (38, ""),
+        "ArrowDown" => (40, ""),
+        letter => (u32::from(letter.to_ascii_uppercase().as_bytes()[0]), letter),
+    };
+    let kind = match (kind, text) {
+        ("down", "") => "rawKeyDown",
+        ("down", _) => "keyDown",
+        _ => "keyUp",
+    };
+    let text = if kind == "keyDown" { text } else { "" };
+    let params = json!({
+        "type": kind, "key": key, "code": key, "text": text, "windowsVirtualKeyCode": code,
+        "autoRepeat": is_repeat,
+    });
+    page.call("Input.dispatchKeyEvent", &params);
+}
+
+pub(crate) fn press(page: &mut Page, key: &str) {
+    stroke(page, "down", key, false);
+    stroke(page, "up", key, false);
+}
+
+/// Holds a key for more than a second, which repeats meanwhile.
+pub(crate) fn hold_down(page: &mut Page, key: &str) {
+    stroke(page, "down", key, false);
+    for _ in 0..26 {
+        std::thread::sleep(Duration::from_millis(50));
+        stroke(page, "down", key, true);
+    }
+    stroke(page, "up", key, false);
+}
 
 /// More controls than a view has.
 const CONTROLS: usize = 150;
@@ -28,7 +68,7 @@ fn press_until(page: &mut Page, selector: &str, is_done: &str) {
         reach(page, selector);
         press(page, "Enter");
         (0..100).find_map(|_| {
-            std::thread::sleep(std::time::Duration::from_millis(20));
+            std::thread::sleep(Duration::from_millis(20));
             (page.value(is_done) == true).then_some(())
         })
     });
@@ -90,7 +130,7 @@ fn keys_alone_order_drive_stop_resume_and_say_where_the_robot_stands() {
         reach(&mut page, "#resume");
         hold_down(&mut page, "Enter");
         (0..100).find_map(|_| {
-            std::thread::sleep(std::time::Duration::from_millis(20));
+            std::thread::sleep(Duration::from_millis(20));
             (page.value("document.body.dataset.look !== 'stopped'") == true).then_some(())
         })
     });
@@ -101,7 +141,7 @@ fn keys_alone_order_drive_stop_resume_and_say_where_the_robot_stands() {
     );
     press_until(
         &mut page,
-        "#autonomous",
+        "#where-ask",
         "document.querySelector('#where').open",
     );
     press_until(
@@ -109,7 +149,11 @@ fn keys_alone_order_drive_stop_resume_and_say_where_the_robot_stands() {
         "#where [type=submit]",
         "!document.querySelector('#where').open",
     );
-    page.wait_for("#mode", "AUTONOMOUS");
+    press_until(
+        &mut page,
+        "#autonomous",
+        "document.querySelector('#mode').textContent === 'AUTONOMOUS'",
+    );
 
     show(&mut page, "log");
     reach(&mut page, "#entries *");

@@ -11,46 +11,8 @@ use serde_json::{Value, json};
 
 use crate::Scene;
 use crate::browser::Page;
+use crate::keyboard::{hold_down, press, stroke};
 use crate::played::Stage;
-
-/// Moves a key as a keyboard does: with what it writes, scrolls and presses.
-fn stroke(page: &mut Page, kind: &str, key: &str, is_repeat: bool) {
-    let (code, text) = match key {
-        "Enter" => (13, "\r"),
-        " " => (32, " "),
-        "Escape" => (27, ""),
-        "ArrowLeft" => (37, ""),
-        "ArrowUp" => (38, ""),
-        "ArrowDown" => (40, ""),
-        letter => (u32::from(letter.to_ascii_uppercase().as_bytes()[0]), letter),
-    };
-    let kind = match (kind, text) {
-        ("down", "") => "rawKeyDown",
-        ("down", _) => "keyDown",
-        _ => "keyUp",
-    };
-    let text = if kind == "keyDown" { text } else { "" };
-    let params = json!({
-        "type": kind, "key": key, "code": key, "text": text, "windowsVirtualKeyCode": code,
-        "autoRepeat": is_repeat,
-    });
-    page.call("Input.dispatchKeyEvent", &params);
-}
-
-pub(crate) fn press(page: &mut Page, key: &str) {
-    stroke(page, "down", key, false);
-    stroke(page, "up", key, false);
-}
-
-/// Holds a key for more than a second, which repeats meanwhile.
-pub(crate) fn hold_down(page: &mut Page, key: &str) {
-    stroke(page, "down", key, false);
-    for _ in 0..26 {
-        std::thread::sleep(Duration::from_millis(50));
-        stroke(page, "down", key, true);
-    }
-    stroke(page, "up", key, false);
-}
 
 /// What the page has sent, but that it is there.
 pub(crate) const SAID: &str = "sent.filter((line) => !line.startsWith('here '))";

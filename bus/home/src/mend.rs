@@ -223,6 +223,7 @@ fn tidy(home: &Home, unit: &UnitName, kept: &[&str]) -> usize {
     in_use::remove_unused(&folder.join("bells"));
     // While this process holds the name, no supervisor can start.
     if let Ok(_name) = home.lock_name(unit) {
+        home.forget_watched(unit);
         for path in kept.iter().map(|name| folder.join(name)) {
             if fs::remove_file(&path).is_err() {
                 let _ = fs::remove_dir_all(path);

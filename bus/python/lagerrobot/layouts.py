@@ -526,7 +526,7 @@ class CalibratedSensor(Layout):
 
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0xE059903C197FB104
+    _hash_ = 0x352F6A4FCC6A2698
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),

@@ -82,6 +82,9 @@ pub trait SteeringBoard: Board {
     fn battery_decivolts(&mut self) -> u8;
 }
 
+/// Duties of both sides, left first.
+pub(crate) type Motors = (Motor, Motor);
+
 /// The order to one motor driver. "Forward" is the robot's direction: the drivers are mirrored, and
 /// only the board knows which level of a DIR pin means forward (W2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]

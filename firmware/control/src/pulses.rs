@@ -18,8 +18,8 @@
 use lager_wire::Speed;
 
 use crate::Motor;
+use crate::board::Motors;
 use crate::time::reached;
-use crate::wheels::Motors;
 
 /// A quarter of a pulse and its pause, in microseconds.
 const QUARTER_US: u32 = 20_000;

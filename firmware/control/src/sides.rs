@@ -17,8 +17,8 @@
 
 use lager_wire::LineState;
 
+use crate::board::Motors;
 use crate::time::reached;
-use crate::wheels::Motors;
 use crate::{Motor, PWM_STANDARD};
 
 /// Time from one correction in the mean to the next, in microseconds.

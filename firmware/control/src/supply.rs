@@ -8,8 +8,8 @@
 //! within one step of a reading of 11.1 V, or at a voltage that no battery can have.
 
 use crate::Motor;
+use crate::board::Motors;
 use crate::divide::divide;
-use crate::wheels::Motors;
 
 /// All duties are meant for this battery, in tenths of a volt.
 const NOMINAL_DECIVOLTS: u8 = 111;

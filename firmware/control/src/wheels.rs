@@ -15,13 +15,11 @@
 
 use lager_wire::{LineBits, WheelCommand};
 
+use crate::board::Motors;
 use crate::follow::{Follow, Lost};
 use crate::pulses::Pulses;
 use crate::turn::{Angle, Rotation, Turn};
 use crate::{Motor, PWM_STANDARD};
-
-/// Duties of both sides, left first.
-pub(crate) type Motors = (Motor, Motor);
 
 /// Both sides standing still.
 pub(crate) const STILL: Motors = (Motor::OFF, Motor::OFF);

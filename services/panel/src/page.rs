@@ -153,7 +153,7 @@ mod tests {
             .iter()
             .map(|path| file(path, "r1").unwrap().1.len())
             .sum();
-        assert!(bytes < 350_000, "{bytes}");
+        assert!(bytes < 390_000, "{bytes}");
         assert!(LOOK.contains("#setup-bar") && !LOOK.contains("*/"));
     }
 

@@ -32,6 +32,7 @@ use lager_wire::link::BoardLink;
 use lager_wire::{ArmCommand, ArmProfile, COMMAND_AGE, Callsign, LineBits, LineState, ResetCause};
 
 use crate::arm::{Arm, ArmConfig, ArmEnd, Start};
+use crate::board::Motors;
 use crate::failsafe::CommandAge;
 use crate::line::LineReader;
 use crate::load::Load;
@@ -41,7 +42,7 @@ use crate::sides::Sides;
 use crate::store::Store;
 use crate::supply::Supply;
 use crate::time::{first, reached};
-use crate::wheels::{Motors, STILL, Wheels};
+use crate::wheels::{STILL, Wheels};
 use crate::{Board, EEPROM_POLL_US, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
 use messages::Reports;
 

@@ -207,7 +207,13 @@ fn a_person_is_called_as_he_wants_and_no_two_open_pages_alike() {
     let own = format!("http://{}", panel.host());
     let page = |name| panel.page_of(name, &own, &panel.cookie()).unwrap();
     let mut anna = page("%C3%85sa");
-    assert_eq!(anna.line("you").unwrap(), "you Åsa driver");
-    assert_eq!(page("%C3%85sa").line("you").unwrap(), "you Åsa-2 driver");
-    assert_eq!(page("panel-1").line("you").unwrap(), "you panel-3 driver");
+    assert_eq!(anna.line("you").unwrap(), crate::you("Åsa driver"));
+    assert_eq!(
+        page("%C3%85sa").line("you").unwrap(),
+        crate::you("Åsa-2 driver")
+    );
+    assert_eq!(
+        page("panel-1").line("you").unwrap(),
+        crate::you("panel-3 driver")
+    );
 }

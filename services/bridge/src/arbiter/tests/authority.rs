@@ -131,7 +131,7 @@ fn undefined_codes_are_refused_counted_and_change_nothing() {
         assert_eq!(bench.give(bad), Verdict::Refused(Refusal::Undefined));
         count += 1;
     }
-    assert_eq!(count, 256 - 22);
+    assert_eq!(count, 256 - 30);
     assert_eq!(bench.health().orders_refused, count);
     bench.run(1);
     assert_eq!(bench.board.code, FORWARD.code());
