@@ -242,7 +242,7 @@ link.addEventListener("warehouse", () => {
 link.addEventListener("link", words);
 words();
 
-/** All that is not moved is drawn five times a second. */
+/** All that is not moved is drawn five times a second, and all else while nothing moves. */
 const REST_MS = 200;
 /**
  * What part of a core pictures may take. Each new pose is drawn at once, twenty times a second. As many
@@ -256,6 +256,12 @@ let drawn = -Infinity;
 /** @type {number | null} */
 let due = null;
 let timer = 0;
+
+/** Whether the next picture may differ from this one in more than figures. */
+function moves() {
+  const { left_duty: left = 0, right_duty: right = 0 } = robot()?.state ?? {};
+  return at("armed").checked || moment.isPast || Number(left) !== 0 || Number(right) !== 0;
+}
 
 /** Draws in the browser's next picture. */
 function soon() {
@@ -272,7 +278,7 @@ function picture() {
   const time = now();
   painted.port2.postMessage(time);
   const pause = cost / SHARE;
-  timer = setTimeout(soon, Math.min(pause, REST_MS));
+  timer = setTimeout(soon, moves() ? Math.min(pause, REST_MS) : REST_MS);
   const isSmooth = pause < 34;
   const shown = robot();
   driving.pads();
@@ -328,5 +334,5 @@ function drawRest(shown, time, seen, then) {
  */
 const asNow = (live) => Object.create(live, { name: { value: say("time_now") }, isStale: { value: () => true } });
 
-link.addEventListener("pose", soon);
+link.addEventListener("pose", () => moves() && soon());
 soon();
