@@ -10,8 +10,8 @@
 //!
 //! Every wheel command replaces the mode before it; only a turn ends by itself. The duty is the
 //! standard one or 0 in every mode except following; [`crate::pulses`] makes a person's lower speeds
-//! of it. [`crate::follow`] gives following up without
-//! words or tape; the robot then stands until the next command.
+//! of it. [`crate::follow`] gives following up without words or tape; the robot then stands until the
+//! next command.
 
 use lager_wire::{LineBits, WheelCommand};
 

@@ -67,6 +67,8 @@ pub struct Senses {
 pub struct Machine {
     /// How many processes want a core, in percent of the cores; `None` is not known.
     pub load_percent: Option<u32>,
+    /// How many cores it has.
+    pub cores: Option<u16>,
     /// All its memory and what programs can still get, in MiB.
     pub memory_mib: Option<[u32; 2]>,
     /// The services that `lager up` keeps alive.

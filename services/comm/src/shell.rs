@@ -12,7 +12,6 @@ use std::path::PathBuf;
 
 use lager_battery::Pack;
 use lager_home::{Clock, Home, UnitName};
-use lager_lines::extension::Finding;
 use lager_lines::{MAX_LINE, Name, to_line};
 use lager_operator::Act;
 use lager_orders::{Code, Moment};
@@ -59,8 +58,8 @@ pub struct CommConfig {
     pub pack: Pack,
     /// Whether to take over the map of an earlier comm.
     pub resume: bool,
-    /// Finds out what is wrong with this machine, in well under a millisecond.
-    pub findings: fn() -> Vec<Finding>,
+    /// Finds out how this machine is, but for its services, in well under a millisecond.
+    pub machine: fn() -> Machine,
 }
 
 /// Runs the communication unit until `shutdown` is requested. `watchdog` guards its turns, and ends
@@ -114,7 +113,7 @@ struct Shell {
     stop_word: PathBuf,
     home: Home,
     robot: UnitName,
-    findings: fn() -> Vec<Finding>,
+    machine: fn() -> Machine,
 
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
@@ -172,7 +171,7 @@ impl Shell {
             stop_word: bus.home().folder_of(bus.unit()).join(StopPage::FILE),
             home: bus.home().clone(),
             robot: bus.unit().clone(),
-            findings: config.findings,
+            machine: config.machine,
             health: opening.subscriber()?,
             status: opening.subscriber()?,
             queue: opening.subscriber()?,
@@ -267,8 +266,8 @@ impl Shell {
             self.take_senses();
             if self.conversation.is_to_tell_health(now) {
                 self.conversation.machine(Machine {
-                    found: (self.findings)(),
-                    ..Machine::look(&self.home, &self.robot)
+                    services: self.home.watched(&self.robot),
+                    ..(self.machine)()
                 });
             }
             self.conversation.tell(now);

@@ -38,7 +38,7 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
         link_lost: joined.comm.link_lost,
         pack: joined.pack(),
         resume: args.service.resume,
-        findings: doctor::soon::findings,
+        machine: doctor::soon::machine,
     };
     Ok((joined, wanted))
 }

@@ -67,8 +67,13 @@ impl Load {
     }
 
     /// How many processes want a core, in percent of the cores.
-    pub fn percent(&self) -> f64 {
-        self.wanting * 100.0 / self.cores as f64
+    pub fn percent(&self) -> u32 {
+        (self.wanting * 100.0 / self.cores as f64).round() as u32
+    }
+
+    /// How many cores there are.
+    pub const fn cores(&self) -> usize {
+        self.cores
     }
 
     /// How busy it is, in words.
@@ -164,6 +169,7 @@ mod tests {
         }
         assert_eq!(Load::read("", None, 2), None);
         let load = Load::read("25.14 9 4", None, 2).expect("a load");
+        assert_eq!((load.percent(), load.cores()), (1_257, 2));
         assert_eq!(load.said(), "25.1 processes want 2 cores");
     }
 

@@ -13,8 +13,7 @@ use lager_topics::{
 };
 
 use super::{AGAIN, Asker, Conversation, STOPPED, UNTOLD};
-use crate::known::Machine;
-use crate::known::{Senses, Stood};
+use crate::known::{Machine, Senses, Stood};
 use crate::{speech, telling};
 
 impl Conversation {

@@ -448,6 +448,7 @@ fn how_machine_services_and_boards_are_is_told_once_a_second() {
     let began = robot.now.ns;
     robot.conversation.machine(Machine {
         load_percent: Some(37),
+        cores: Some(4),
         memory_mib: Some([3_794, 2_100]),
         services: vec![
             service("bridge", Some(7), 0, 0),
@@ -467,7 +468,7 @@ fn how_machine_services_and_boards_are_is_told_once_a_second() {
     let told: Vec<_> = told.collect();
     assert_eq!(told.len(), 3, "{told:?}");
     for field in [
-        " load_percent=37 ",
+        " load_percent=37 cores=4 ",
         " memory_mib=3794 memory_free_mib=2100 ",
         " sensor_age_ms=",
         " sensor_version=1 ",
