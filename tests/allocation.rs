@@ -69,7 +69,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
             health
                 .latest()
                 .expect("readable")
-                .filter(|health| health.sensor.up != 0 && health.steering.up != 0)
+                .filter(|health| health.boards_are_ready())
                 .map(|_| ())
         });
         let ask = Ask {

@@ -223,7 +223,11 @@ fn boards_at_a_cable(domain: &Domain) -> (Running, Cable, String) {
     let write = |name: &str, steering: &std::path::Path| {
         let path = file(name);
         let serial = format!("[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
-        std::fs::write(&path, format!("body = \"serial\"\n{serial}")).expect("a configuration");
+        std::fs::write(
+            &path,
+            format!("body = \"serial\"\nwarehouse = \"small\"\n{serial}"),
+        )
+        .expect("a configuration");
         path.to_str().expect("a path in UTF-8").to_owned()
     };
     let (boards, config) = (

@@ -261,7 +261,10 @@ fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
     let config = domain.folder().join("robot.toml");
     std::fs::write(
         &config,
-        format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n"),
+        format!(
+            "body = \"serial\"\nwarehouse = \"small\"\n\
+             [serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n"
+        ),
     )
     .expect("a configuration file");
     let config = config.to_str().expect("a path in UTF-8");

@@ -39,7 +39,7 @@ pub fn in_tree(path: &str) -> PathBuf {
 #[must_use]
 pub fn emulator() -> PathBuf {
     let images = in_tree("firmware/avr/target");
-    for image in ["sensor", "steering"] {
+    for image in ["sensor", "steering", "sensor-loader", "steering-loader"] {
         let list = images.join(format!("avr-none/release/{image}.d"));
         built(&images.join(format!("images/{image}.elf")), &list);
     }
@@ -275,8 +275,12 @@ impl Domain {
     }
 }
 
-/// Whether this file may stay: orders, a warehouse, a history, or the lock of a killed station.
+/// Whether this file may stay: orders, a warehouse, a history, the lock of a killed station, or what
+/// an emulated board keeps without power.
 fn is_kept(path: &Path) -> bool {
+    if path.extension().is_some_and(|end| end == "eeprom") {
+        return true;
+    }
     let is_state = path.components().any(|part| part.as_os_str() == ".state");
     let is_file = path.extension().is_some_and(|end| {
         ["toml", "queue", "log", "lock"]
@@ -297,9 +301,13 @@ impl Domain {
     fn show_logs(&self) {
         const LINES: usize = 40;
         for entry in fs::read_dir(self.folder()).into_iter().flatten().flatten() {
+            // A link to a serial port beside them would be read without an end.
+            if entry.path().extension().is_none_or(|end| end != "log") {
+                continue;
+            }
             let log = fs::read(entry.path()).unwrap_or_default();
             let log = String::from_utf8_lossy(&log);
-            if entry.path().extension().is_some_and(|end| end == "log") && !log.is_empty() {
+            if !log.is_empty() {
                 let skipped = log.lines().count().saturating_sub(LINES);
                 eprintln!("--- {}", entry.file_name().to_string_lossy());
                 log.lines()

@@ -354,6 +354,20 @@ fn who_lacks_a_right_is_told_what_to_do_before_anything_runs() {
     domain.assert_clean();
 }
 
+/// As root the robot has every right, and whoever asks has fewer: the kernel hides its files.
+#[test]
+fn who_has_fewer_rights_than_the_robot_finds_it_all_the_same() {
+    let domain = Domain::new();
+    let up = domain.start(&["up", "--headless"]);
+    wait_for("the robot", || {
+        up.output().contains("drives from").then_some(())
+    });
+    let asked = run_without_rights(&domain, &["map"]);
+    assert!(asked.status.success(), "{}", said(&asked));
+    drop(up);
+    domain.assert_clean();
+}
+
 #[test]
 fn cores_that_are_not_there_and_spinning_on_all_of_them_are_refused() {
     let domain = Domain::new();

@@ -83,7 +83,11 @@ impl Boards {
         let [sensor, steering, cable] = ["sensor.tty", "steering.tty", "cable.tty"].map(file);
         let write = |name: &str, steering: &Path| {
             let serial = format!("[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
-            fs::write(file(name), format!("body = \"serial\"\n{serial}")).expect("a configuration");
+            fs::write(
+                file(name),
+                format!("body = \"serial\"\nwarehouse = \"small\"\n{serial}"),
+            )
+            .expect("a configuration");
         };
         write("boards.toml", &steering);
         write("robot.toml", &cable);

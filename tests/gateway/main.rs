@@ -9,6 +9,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use lager_tests::{Domain, free, pid, wait_for};
+use lager_wire::BUILD;
 use rustix::process::{Signal, kill_process};
 
 /// The answer to a request; `None` while nobody listens.
@@ -74,6 +75,9 @@ fn figures_tell_what_the_robot_does_and_outlive_a_killed_gateway() {
         |count| count > 0.0,
     );
     let figures = figures(&metrics).expect("figures");
+    let fits =
+        format!("lager_board_image_fits{{robot=\"r1\",board=\"steering\",build=\"{BUILD}\"}}");
+    assert_eq!(figures[&fits], 1.0);
     assert!((8.0..16.0).contains(&figures["lager_battery_volts{robot=\"r1\"}"]));
     let bucket = |end: &str| {
         let name =

@@ -13,7 +13,7 @@ use lager_stop::Stop;
 use lager_topics::{
     Ask, BridgeAnswer, Health, Origin, Role, SteeringOrder, SteeringReport, StopCause,
 };
-use lager_wire::ArmProfile;
+use lager_wire::RobotProfile;
 
 use crate::judge::Judge;
 use crate::mends::Mends;
@@ -94,9 +94,9 @@ impl Bridge {
     fn new(kept: Option<(&Health, Duration)>) -> Self {
         let options = CoreOptions {
             baud: 500_000,
-            raw_line: false,
+            raw_line: true,
             original_boards: false,
-            arm: ArmProfile::default(),
+            robot: RobotProfile::default(),
         };
         Self {
             core: BridgeCore::new(options, kept),

@@ -261,6 +261,19 @@ impl Page {
         (place[0].as_f64().expect("x"), place[1].as_f64().expect("y"))
     }
 
+    /// Opens the view of a tab, and waits until its script is there.
+    pub(crate) fn open_view(&mut self, tab: &str) {
+        self.click(&format!("#tab-{tab}"));
+        self.wait_until("!document.querySelector('[role=tabpanel]:not([hidden])').inert");
+    }
+
+    /// Changes the page's language, and waits until its words are there.
+    pub(crate) fn change_language(&mut self) {
+        let before = self.value("document.documentElement.lang");
+        self.click("#language");
+        self.wait_until(&format!("document.documentElement.lang !== {before}"));
+    }
+
     /// Lets the page save files into this folder.
     pub(crate) fn save_into(&mut self, folder: &Path) {
         let params = json!({ "behavior": "allow", "downloadPath": folder });

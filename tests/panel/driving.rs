@@ -220,24 +220,17 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
     page.click("#armed");
     page.value("document.activeElement.blur()");
     // After a drive by hand the robot does not know its place any more.
-    // An order that was held up ends the hold, and then a person presses again.
-    wait_for("the place not to be known", || {
-        scene.hold(page, "ArrowLeft");
-        for _ in 0..100 {
-            if page.text("#map-text").contains("not known where") {
-                return Some(());
-            }
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
-        page.key_up("ArrowLeft");
-        None
+    scene.hold_until(page, "ArrowLeft", |page| {
+        page.text("#map-text").contains("not known where")
     });
     // The map shows the last known place, in a circle that grows with the driven distance.
     page.wait_for("#map .chip text", "place unknown");
     page.wait_until("!document.querySelector('#map .robot').hasAttribute('hidden')");
     let radius = "document.querySelector('#map .unsure').r.baseVal.value";
     let before = page.value(radius).as_f64().expect("a radius");
-    page.wait_until(&format!("{radius} > {before} + 20"));
+    scene.hold_until(page, "ArrowLeft", |page| {
+        page.value(radius).as_f64().expect("a radius") > before + 20.0
+    });
     page.key_up("ArrowLeft");
     scene.wait_to_stand();
     page.click("#autonomous");
@@ -460,7 +453,7 @@ pub(crate) fn in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_i
         document.querySelector('#stop-place').getBoundingClientRect().top";
     assert_eq!(page.value(free), true, "STOP covers the pad");
     for tab in TABS {
-        page.click(&format!("#tab-{tab}"));
+        page.open_view(tab);
         page.pause();
         let small = page.value(
             "[...document.querySelectorAll('button, select, input, label.button')].filter((part) => { \

@@ -38,7 +38,7 @@ fn size(page: &mut Page) -> Value {
 /// The warehouse that the station keeps, as a page that is opened now draws it.
 fn kept(stage: &Stage) -> String {
     let mut page = stage.page(&stage.url);
-    page.click("#tab-setup");
+    page.open_view("setup");
     page.wait_until("document.querySelectorAll('#products tr').length > 0");
     let told = format!(
         "{} {}",
@@ -96,7 +96,7 @@ fn the_map_is_the_form_and_what_was_saved_can_be_undone_and_saved_again() {
     let stage = Stage::new(Some(HALL));
     let robot = stage.robot("r1", &["state x_mm=0 y_mm=0 heading_deg=90 node=0,0 looks=right hold=none mode=autonomous phase=waiting_for_order"]);
     let mut page = stage.page(&stage.url);
-    page.click("#tab-setup");
+    page.open_view("setup");
     wait_for_rows(&mut page, "2,nails,0,0,up 7,,1,1,right");
 
     // An edge is dragged: the new size is shown meanwhile, and counts at the end. No drag leaves the
@@ -180,7 +180,7 @@ fn the_map_is_the_form_and_what_was_saved_can_be_undone_and_saved_again() {
 fn keys_alone_set_a_warehouse_up_and_who_looks_changes_nothing() {
     let stage = Stage::new(Some(HALL));
     let mut page = stage.page(&stage.url);
-    page.click("#tab-setup");
+    page.open_view("setup");
     wait_for_rows(&mut page, "2,nails,0,0,up 7,,1,1,right");
     // By keys alone: Tab leads to the map.
     wait_for("the map to have the focus", || {
@@ -222,7 +222,7 @@ fn keys_alone_set_a_warehouse_up_and_who_looks_changes_nothing() {
     // Whoever may only look sees the warehouse, and no drag, click or key changes it.
     let before = kept(&stage);
     let mut page = stage.page(&stage.viewer);
-    page.click("#tab-setup");
+    page.open_view("setup");
     page.wait_until("document.querySelectorAll('#products tr').length === 3");
     let shown = rows(&mut page);
     drag(&mut page, (1_630.0, 500.0), (2_640.0, 500.0), |_| {});
@@ -246,7 +246,7 @@ fn a_simulated_robot_is_put_into_the_saved_warehouse_after_a_question_and_stands
     let mut scene = Scene::new(1.0, &["--mission", "3"]);
     let mut page = scene.page();
     scene.wait_to_move();
-    page.click("#tab-setup");
+    page.open_view("setup");
     page.wait_for("#kept-robots", "r1 uses it.");
     assert_eq!(
         page.value("document.querySelector('#renew').hidden"),

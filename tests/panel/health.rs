@@ -22,7 +22,7 @@ pub(crate) fn a_killed_service_shows_as_died_and_back_with_its_count(
     scene: &mut Scene,
     page: &mut Page,
 ) {
-    page.click("#tab-health");
+    page.open_view("health");
     wait_for("the service to run", || {
         let (mark, told) = row(page, "logic");
         (mark == "good" && told.contains("runs for") && !told.contains("again")).then_some(())
@@ -60,10 +60,11 @@ fn a_silent_board_is_cut_in_the_chain_and_each_fault_has_its_remedy() {
     let state = "state time_ms=81250 mode=autonomous stopped=0 phase=waiting_for_order \
                  sensor_up=0 steering_up=1 sensor_lost=7 steering_lost=0 bus_lost=0";
     let health = "health release=9.9.9 load_percent=310 cores=4 sensor_age_ms=70000 \
-                  sensor_version=1 services=bridge:up:812:0 found=shared_memory:12,unheard_of:1";
+                  sensor_version=1 sensor_build=1 steering_version=1 steering_build=3 \
+                  program_build=2 services=bridge:up:812:0 found=shared_memory:12,unheard_of:1";
     let robot = stage.robot("r1", &[state, health]);
     let mut page = stage.page(&stage.url);
-    page.click("#tab-health");
+    page.open_view("health");
     wait_for("the board to be missed", || {
         (row(&mut page, "sensor").0 == "bad").then_some(())
     });
@@ -83,6 +84,13 @@ fn a_silent_board_is_cut_in_the_chain_and_each_fault_has_its_remedy() {
         mark == "bad" && told.contains("9.9.9") && told.contains("update"),
         "{told}"
     );
+    for (board, helps) in [
+        ("sensor", "update the boards on the robot's computer"),
+        ("steering", "newer program"),
+    ] {
+        let (mark, told) = row(&mut page, &format!("release-{board}"));
+        assert!(mark == "bad" && told.contains(helps), "{told}");
+    }
     // A robot that is gone takes what is known of its boards with it.
     drop(robot);
     wait_for("the robot to be missed", || {

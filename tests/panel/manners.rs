@@ -52,7 +52,7 @@ pub(crate) fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop(
     for (width, height) in [(1280, 720), (3840, 2160), (901, 700), (360, 740)] {
         page.dress("light", width, height, width < 900);
         for tab in TABS {
-            page.click(&format!("#tab-{tab}"));
+            page.open_view(tab);
             page.value("scrollTo(0, 0)");
             page.pause();
             assert_eq!(
@@ -81,7 +81,7 @@ pub(crate) fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop(
         page.dress("light", width, height, false);
         // How long the list of services is, the robot says.
         for tab in TABS.into_iter().filter(|tab| *tab != "health") {
-            page.click(&format!("#tab-{tab}"));
+            page.open_view(tab);
             page.pause();
             let fits = format!(
                 "document.documentElement.scrollHeight <= innerHeight && (() => {{ \
@@ -132,8 +132,8 @@ pub(crate) fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_
 }
 
 pub(crate) fn the_words_are_swedish_for_who_reads_swedish(_scene: &mut Scene, page: &mut Page) {
-    page.click("#tab-setup");
-    page.click("#language");
+    page.open_view("setup");
+    page.change_language();
     page.wait_for("#stop-word", "STOPP");
     // What the page showed before changes its language, too.
     let shown = "['#products option', '#map .robot title', '#map .ghost title'].map((part) => \
@@ -148,7 +148,7 @@ pub(crate) fn the_words_are_swedish_for_who_reads_swedish(_scene: &mut Scene, pa
     page.wait_for("#link", " ms");
     assert_eq!(page.text("#tab-missions"), "Uppdrag");
     // The browser keeps the language for later pages.
-    page.click("#language");
+    page.change_language();
 }
 
 pub(crate) fn the_display_on_the_robot_stops_it(scene: &mut Scene, page: &mut Page) {
@@ -157,6 +157,19 @@ pub(crate) fn the_display_on_the_robot_stops_it(scene: &mut Scene, page: &mut Pa
     scene.wait_to_move();
     page.wait_until("document.querySelector('.screen #figures')?.textContent.length > 0");
     assert_eq!(page.value(NEAR_STOP), json!([]));
+    // STOP covers none of the words, on whatever display they are.
+    let covered = "(() => { const stop = document.querySelector('#stop').getBoundingClientRect(); \
+                   return [...document.querySelectorAll('.screen :is(h1, #state, #figures)')].filter((part) => { \
+                     const words = document.createRange(); words.selectNodeContents(part); \
+                     return [...words.getClientRects()].some(({ top, bottom, left, right }) => \
+                       bottom > stop.top && top < stop.bottom && right > stop.left && left < stop.right); \
+                   }).map(({ id }) => id); })()";
+    for (width, height) in [(1280, 720), (800, 480), (390, 844), (320, 480)] {
+        page.dress("light", width, height, width < 800);
+        page.wait_until(&format!("innerWidth === {width}"));
+        assert_eq!(page.value(covered), json!([]), "{width}x{height}");
+    }
+    page.dress("light", 1280, 720, false);
     page.key_down(" ");
     page.key_up(" ");
     page.wait_until(
@@ -241,7 +254,7 @@ pub(crate) fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button(
     }
 
     // From a text field, too, and in manual mode.
-    page.click("#tab-setup");
+    page.open_view("setup");
     page.value("document.querySelector('#warehouse input').focus()");
     page.key_down("Escape");
     page.wait_for("#stop-said", "both wheels stand");
@@ -286,10 +299,10 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     looks.click("#tab-drive");
     looks.click("#control");
     looks.wait_for("#drive-said", "this page may look and stop");
-    looks.click("#language");
+    looks.change_language();
     looks.click("#control");
     looks.wait_for("#drive-said", "den här sidan får titta och stoppa");
-    looks.click("#language");
+    looks.change_language();
     // What would order goods is off.
     looks.click("#tab-missions");
     looks.wait_until(
@@ -352,7 +365,7 @@ fn an_accessibility_checker_finds_nothing() {
     };
     page.value(&axe);
     for tab in TABS {
-        page.click(&format!("#tab-{tab}"));
+        page.open_view(tab);
         page.wait_until(
             "(() => { const heads = [...document.querySelectorAll('[role=tabpanel]:not([hidden]) h3')]; \
              return heads.every(({ textContent }) => textContent) && \
@@ -374,7 +387,7 @@ fn an_accessibility_checker_finds_nothing() {
     let frozen = scene.freeze("comm");
     page.wait_for("#state", "r1 is not heard");
     for tab in TABS {
-        page.click(&format!("#tab-{tab}"));
+        page.open_view(tab);
         check(&mut page, &format!("{tab}, when it is old"));
     }
     drop(frozen);

@@ -310,11 +310,13 @@ fn the_map_is_to_scale_and_can_be_read_from_2_to_20_squares() {
         ));
         page.pause();
         page.pause();
-        let wrong = page.value(&format!("(() => {{ {BOXES} return {UNREADABLE}; }})()"));
-        assert_eq!(
-            wrong,
-            json!([]),
-            "{squares} squares, in the hand: {in_hand}"
+        let unreadable = format!("(() => {{ {BOXES} return {UNREADABLE}; }})()");
+        wait_for(
+            &format!("{squares} squares, in the hand: {in_hand}"),
+            || {
+                // What is drawn of another size is as large as it should be one picture later.
+                (page.value(&unreadable) == json!([])).then_some(())
+            },
         );
         // A large warehouse shows fewer numbers and no names, a small one all of them.
         let count = |page: &mut Page, part: &str| {

@@ -1,6 +1,9 @@
-//! Tests that a robot which needs a person says so to one who looks elsewhere, and that the remedy
-//! is a button beside the sentence that names it.
+//! Tests that a robot which needs a person says so to one who looks elsewhere, by words and by a
+//! sound, and that the remedy is a button beside the sentence that names it.
 
+use serde_json::json;
+
+use crate::browser::Page;
 use crate::played::Stage;
 
 const FLOOR: &str = "size = [2, 2]\nside_length_cm = 50\ndelivery = [0, 0]\n";
@@ -51,5 +54,47 @@ fn whoever_looks_elsewhere_is_told_by_title_and_message_and_a_button_does_the_re
     viewer.wait_until("!document.querySelector('#remedy').hidden");
     viewer.wait_until("document.querySelector('#remedy').disabled");
     drop((viewer, robot));
+    stage.end();
+}
+
+/// Keeps each tone that would be heard in `tones`: its length in s. A page may sound only after a
+/// person has pressed something on it.
+const TONES: &str = "window.tones = []; \
+     window.AudioContext = class { state = 'suspended'; currentTime = 7; destination = {}; \
+       resume() { this.state = 'running'; } }; \
+     window.OscillatorNode = class { \
+       constructor(audio, { frequency }) { Object.assign(this, { audio, frequency }); } \
+       connect(to) { this.isHeard = to === this.audio.destination; } \
+       start() { this.isOn = this.audio.state === 'running' && this.frequency > 0; } \
+       stop(at) { if (this.isOn && this.isHeard) tones.push(at - this.audio.currentTime); } }; true";
+
+#[test]
+fn a_need_sounds_once_and_only_for_who_wants_it() {
+    let stage = Stage::new(Some(FLOOR));
+    let robot = stage.robot("r1", &[WELL]);
+    let mut page = stage.page(&stage.url);
+    page.wait_for("#doing", "waits for an order");
+    page.value(TONES);
+    page.click("#tab-log");
+    // Longer than a need that passes by itself, by the page's own time.
+    let rest = |page: &mut Page| {
+        let began = page.value("performance.now()");
+        page.wait_until(&format!("performance.now() - {began} > 3000"));
+    };
+    let needs = |page: &mut Page| {
+        robot.says(&[STUCK]);
+        page.wait_until("document.title.startsWith('! r1: is stuck')");
+        rest(page);
+        robot.says(&[WELL]);
+        page.wait_until("document.title === 'Lagerrobot'");
+        page.value("window.tones.map((length) => length > 0.1 && length < 1)")
+    };
+    assert_eq!(needs(&mut page), json!([]), "nobody has asked for it");
+    page.click("#notify");
+    assert_eq!(needs(&mut page), json!([true]));
+    assert_eq!(needs(&mut page), json!([true, true]));
+    page.click("#notify");
+    assert_eq!(needs(&mut page), json!([true, true]), "no more");
+    drop((page, robot));
     stage.end();
 }

@@ -50,16 +50,16 @@ fn of_every_view() {
     take(&mut page, "under-way-4k-light");
     page.dress("light", 1280, 720, false);
     for tab in ["setup", "line", "log", "health", "signals"] {
-        page.click(&format!("#tab-{tab}"));
+        page.open_view(tab);
         view(&mut page, tab);
     }
     page.click("#help-open");
     view(&mut page, "help");
     page.click("#help-close");
-    page.click("#language");
+    page.change_language();
     page.click("#tab-missions");
     view(&mut page, "under-way-swedish");
-    page.click("#language");
+    page.change_language();
     page.click("#tab-missions");
     page.wait_for("#state", "stands at the goods");
     view(&mut page, "picking");
@@ -131,7 +131,7 @@ fn of_what_is_rare() {
     let mut page = stage.page(&stage.url);
     page.wait_for("#state", "No robot has connected yet");
     view(&mut page, "first-start");
-    page.click("#tab-setup");
+    page.open_view("setup");
     view(&mut page, "empty-warehouse");
     drop(page);
     stage.end();

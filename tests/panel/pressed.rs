@@ -369,7 +369,7 @@ pub(crate) fn a_field_keeps_what_is_typed_and_a_clicked_button_is_not_pressed_by
     scene.arm(page);
     page.listen_in();
     let type_into = |page: &mut Page, tab: &str, field: &str| {
-        page.click(&format!("#tab-{tab}"));
+        page.open_view(tab);
         page.value(&format!(
             "(() => {{ const field = document.querySelector('{field}'); field.value = ''; field.focus(); }})()"
         ));
@@ -484,7 +484,7 @@ pub(crate) fn a_robot_on_its_way_is_not_calibrated_and_the_page_says_why(
     };
     let before = calibrations();
     scene.wait_to_move();
-    page.click("#tab-line");
+    page.open_view("line");
     page.click("#calibrate");
     page.wait_for("#calibration-said", "the robot is on its way by itself");
     assert_eq!(

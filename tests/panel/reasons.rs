@@ -11,7 +11,7 @@ use crate::played::Stage;
 /// The page's sentences for these reasons.
 fn told(page: &mut Page, reasons: &[&str]) -> Value {
     let expression = format!(
-        "import('/words/sentences.js').then(({{ reason }}) => {}.map(reason))",
+        "import('/main.js').then((page) => {}.map(page.$words_sentences.reason))",
         json!(reasons)
     );
     let params = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
@@ -41,7 +41,7 @@ fn every_reason_is_told_as_the_table_has_it_in_both_languages() {
         for (said, reason) in said.iter().zip(&reasons) {
             assert_eq!(**said, reason.sentence(language), "{}", reason.as_str());
         }
-        page.click("#language");
+        page.change_language();
     }
     drop(page);
     stage.end();

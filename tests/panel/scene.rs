@@ -165,6 +165,26 @@ impl Scene {
         });
     }
 
+    /// Holds a key until this is so; if the hold has ended by itself, presses again.
+    pub(crate) fn hold_until(
+        &mut self,
+        page: &mut Page,
+        key: &str,
+        is_so: impl Fn(&mut Page) -> bool,
+    ) {
+        wait_for("what the held key is to do", || {
+            self.hold(page, key);
+            for _ in 0..100 {
+                if is_so(page) {
+                    return Some(());
+                }
+                std::thread::sleep(std::time::Duration::from_millis(20));
+            }
+            page.key_up(key);
+            None
+        });
+    }
+
     /// Freezes a service and the supervisor, which would replace a service that is silent for 2 s.
     pub(crate) fn freeze(&self, name: &str) -> Frozen {
         let service = |name: &str| pid(self.up.service(name).expect("it runs"));
@@ -220,8 +240,9 @@ impl Scene {
             let outside: String = line.split('"').step_by(2).collect();
             outside.matches(',').count()
         };
-        let last = lines.lines().last().expect("a line");
-        assert_eq!(cells(last), cells(head), "{last}");
+        for line in lines.lines() {
+            assert_eq!(cells(line), cells(head), "{line}");
+        }
         // The page saves one file after the other.
         page.wait_until("!document.querySelector('#save-mcap').disabled");
         page.click("#save-mcap");

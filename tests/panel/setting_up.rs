@@ -25,7 +25,7 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     let mut page = scene.page();
     let folder = scene.domain.folder().to_owned();
     page.save_into(&folder);
-    page.click("#tab-setup");
+    page.open_view("setup");
     assert_eq!(
         page.value("document.querySelector('#undo').disabled"),
         true,
@@ -111,7 +111,7 @@ pub(crate) fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step(
 ) {
     page.wait_until("document.querySelector('#sensors .on') !== null");
     scene.take_over(page);
-    page.click("#tab-line");
+    page.open_view("line");
     let are = |p: &str, d: &str| {
         format!("document.querySelector('#gains-now').textContent === 'now {p} and {d}'")
     };
@@ -245,17 +245,17 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
     page.wait_for("#order-name", "nails");
     now("phase=driving sensor_up=0 steering_up=1");
     page.wait_for("#state", "he sensor board is not heard");
-    page.click("#language");
+    page.change_language();
     page.wait_for("#state", "ensorkortet hörs inte");
     page.wait_until("document.querySelector('#map .out-of-reach') === null");
 
     // During the calibration the page marks each sensor that has seen tape and floor.
-    page.click("#language");
-    page.click("#tab-line");
+    page.change_language();
+    page.open_view("line");
     page.click("#calibrate");
     let seen = |page: &mut Page, words: &str| {
         page.wait_until(&format!(
-            "document.querySelector('#calibration-sensors').getAttribute('aria-label').includes('{words}')"
+            "(document.querySelector('#calibration-sensors').ariaLabel ?? '').includes('{words}')"
         ));
     };
     now("sensor_up=1 line_bits=00001110000");
@@ -401,7 +401,7 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     page.wait_until(&format!("{goods} === '1,2,3'"));
 
     // In the set-up view, a click in a square places goods at the square's nearest side.
-    page.click("#tab-setup");
+    page.open_view("setup");
     page.click_at_mm(250.0, 420.0);
     let placed = "(() => { const line = [...document.querySelectorAll('#products tr')].at(-1); \
                   return [...line.querySelectorAll('input, select')].map(({ value }) => value).join(); })()";
@@ -448,7 +448,7 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     page.wait_until(&format!("{placed} === 0"));
 
     // The page does not save a warehouse in which no robot can drive.
-    page.click("#tab-setup");
+    page.open_view("setup");
     for (field, value, why, right) in [
         ("width", "255", "a number from 1 to 99", "2"),
         ("side", "1", "a number from 40 to 500", "50"),

@@ -95,7 +95,7 @@ pub(crate) fn the_view_of_signals_shows_the_station_s_last_minutes_and_holds_sti
         page,
         "window.trueNow = Date.now; Date.now = () => trueNow() - 21_600_000",
     );
-    page.click("#tab-signals");
+    page.open_view("signals");
     page.wait_until("document.querySelectorAll('.lane').length === 6");
     page.click("[data-ms='600000']");
     page.wait_until("document.querySelector('[data-ms=\"600000\"]').ariaPressed === 'true'");
@@ -141,16 +141,16 @@ pub(crate) fn what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_ha
     };
     block(page, json!(["*/signals/signals.js*"]));
     page.click("#tab-signals");
-    page.wait_for("#signals-state", "could not be fetched");
+    page.wait_for("#coming-said", "could not be fetched");
     assert_eq!(page.value("document.querySelectorAll('.lane').length"), 0);
-    page.click("#signals-again");
-    page.wait_for("#signals-state", "could not be fetched");
+    page.click("#coming-again");
+    page.wait_for("#coming-said", "could not be fetched");
     block(page, json!([]));
     page.click_until(
-        "#signals-again",
+        "#coming-again",
         "document.querySelectorAll('.lane').length === 6",
     );
-    page.wait_until("document.querySelector('#signals-state').hidden");
+    page.wait_until("document.querySelector('#coming').hidden");
 
     page.wait_until(
         "((shown) => shown > 0 && totals.includes(shown))(\
@@ -160,7 +160,7 @@ pub(crate) fn what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_ha
 
     // While the keys drive the robot, P holds nothing.
     scene.arm(page);
-    page.click("#tab-signals");
+    page.open_view("signals");
     let is_held = "!document.querySelector('#signals .tag').hidden";
     for _ in 0..3 {
         page.key_down("p");
@@ -171,7 +171,7 @@ pub(crate) fn what_the_view_of_signals_cannot_fetch_is_said_and_the_histogram_ha
     page.click("#tab-drive");
     page.click("#armed");
     page.wait_until("!document.querySelector('#armed').checked");
-    page.click("#tab-signals");
+    page.open_view("signals");
     page.key_down("p");
     page.key_up("p");
     page.wait_until(is_held);

@@ -165,6 +165,84 @@ pub(crate) fn what_happens_to_the_robot_is_in_the_log_and_survives_the_station(
     other.close();
 }
 
+pub(crate) fn each_service_that_is_killed_has_its_end_and_its_return_in_the_log(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    page.click("#tab-log");
+    let rows = |page: &mut Page, service: &str, what: &str| {
+        let rows = page.value(&format!(
+            "[...document.querySelectorAll('.entry')].filter(({{ textContent }}) => \
+             textContent.includes('its service {service} {what}')).length"
+        ));
+        rows.as_u64().expect("a number")
+    };
+    let (ended, back) = ("has ended", "was started anew");
+    for service in ["simulator", "bridge", "logic", "comm", "station"] {
+        let process = pid(scene.up.service(service).expect("it runs"));
+        kill_process(process, Signal::KILL).expect("it runs");
+        page.wait_for("#entries", &format!("its service {service} {back}"));
+        let both = [ended, back].map(|what| rows(page, service, what));
+        assert_eq!(both, [1, 1], "{service}");
+    }
+    // One that does not come back has an end, and no return until it does.
+    let logic = |page: &mut Page| [ended, back].map(|what| rows(page, "logic", what));
+    wait_for("an end without a return", || {
+        if let Some(logic) = scene.up.service("logic") {
+            let _ = kill_process(pid(logic), Signal::KILL);
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        let [ends, returns] = logic(page);
+        (ends == returns + 1).then_some(())
+    });
+    wait_for("its return", || {
+        let [ends, returns] = logic(page);
+        (ends == returns).then_some(())
+    });
+}
+
+pub(crate) fn what_is_ordered_in_a_terminal_is_in_the_log_with_who(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    page.click("#tab-log");
+    let orders: [&[&str]; 6] = [
+        &["queue", "add", "2"],
+        &["mode", "manual"],
+        &["gains", "3", "2"],
+        &["obstacle", "put", "1,1,up"],
+        &["calibrate"],
+        &["drive", "forward", "--seconds", "0.3"],
+    ];
+    for order in orders {
+        let done = scene.domain.run(order);
+        // Nobody moves the robot over tape and floor, so no sensor sees both.
+        assert!(done.status.success() || order == ["calibrate"], "{done:?}");
+    }
+    // What the command line itself refuses nobody has asked of the robot.
+    assert!(!scene.domain.run(&["fetch", "3"]).status.success());
+    let mode = page.text("#mode");
+    for what in [
+        "orders 2",
+        &format!("makes it {mode}"),
+        "sets the line control to 3 2",
+        "puts an obstacle at (1, 1)",
+        "calibrates",
+        "drives it",
+    ] {
+        let told = format!("a command in a terminal {what}");
+        page.wait_for("#entries", &told);
+        let rows = page.value(&format!(
+            "[...document.querySelectorAll('.entry')].filter(({{ textContent }}) => textContent.includes('{told}')).length"
+        ));
+        assert_eq!(rows, 1, "{told}");
+    }
+    assert!(!page.text("#entries").contains("orders 3"));
+    // The queue has it from there, too.
+    page.click("#tab-missions");
+    page.wait_for("#queue", "by a command in a terminal");
+}
+
 /// How a state looks: the page's style, the colour behind its sentence, and the text at the robot.
 const LOOK: &str = "(() => { const at = (part) => document.querySelector(part); \
     return [document.body.dataset.look, getComputedStyle(at('#state') ?? document.body).backgroundColor, \

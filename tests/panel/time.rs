@@ -17,14 +17,24 @@ const NOW: &str = "document.querySelector('#map .other:not([hidden]) .robot:not(
 const IS_PAST: &str = "document.body?.classList.contains('past') === true && \
     document.querySelector('#moment').hidden === false && document.querySelector('#moment strong').textContent !== ''";
 
-/// Makes the browser's clock wrong by so many hours, in pages that are opened from now on.
-fn wrong_clock(page: &mut Page, hours: i32) {
+/// Makes the browser's clock wrong by so many minutes, in pages that are opened from now on. Keeps how
+/// many lines of its history the station has told for each address in `told`, and what is written on
+/// canvases in `written`.
+fn wrong_clock(page: &mut Page, minutes: i32) {
     let source = format!(
-        "const Right = Date; const off = {hours} * 3600000; \
+        "const Right = Date; const off = {minutes} * 60000; \
          Date = class extends Right {{ \
            constructor(...all) {{ if (all.length) super(...all); else super(Right.now() + off); }} \
            static now() {{ return Right.now() + off; }} \
-         }};"
+         }}; \
+         window.told = {{}}; const ask = fetch; \
+         window.fetch = async (...all) => {{ \
+           const answer = await ask(...all); \
+           const lines = (await answer.clone().text()).split('\\n').length - 1; \
+           told[String(all[0]).replace(/.*history/, '')] = lines; return answer; \
+         }}; \
+         window.written = []; const drawn = CanvasRenderingContext2D.prototype; const write = drawn.fillText; \
+         drawn.fillText = function (text, ...at) {{ written.push(text); return write.call(this, text, ...at); }};"
     );
     let source = json!({ "source": source });
     page.call("Page.addScriptToEvaluateOnNewDocument", &source);
@@ -68,19 +78,22 @@ pub(crate) fn a_past_moment_is_marked_orders_nothing_and_is_the_same_on_another_
     let known = page.value(entries).as_u64();
 
     // It comes from the station, so it is the same after a reload, and for a browser elsewhere whose
-    // clock is wrong.
+    // clock is wrong. A page shows each time in its browser's zone, and its address has the moment in
+    // UTC. Nobody chooses a time of the clock or goes a day back, so no part of a page can show or
+    // choose another zone's.
     page.call("Page.reload", &json!({}));
     page.wait_until(IS_PAST);
     wait_for("the same place after a reload", || {
         (far(past, place(page, PLACE)) < 1.0).then_some(())
     });
     assert_eq!(page.value(told), moment);
-    for hours in [-6, 24] {
+    let mut samples = None;
+    for minutes in [0, -6 * 60, 5, 24 * 60] {
         let mut other = scene.browser.page(&scene.url);
         other.wait_for("#link", " ms");
         let zone = json!({ "timezoneId": "Asia/Kolkata" });
         other.call("Emulation.setTimezoneOverride", &zone);
-        wrong_clock(&mut other, hours);
+        wrong_clock(&mut other, minutes);
         other.value(&format!("location.hash = {}", json!(hash)));
         other.call("Page.reload", &json!({}));
         other.wait_until(IS_PAST);
@@ -95,6 +108,15 @@ pub(crate) fn a_past_moment_is_marked_orders_nothing_and_is_the_same_on_another_
         assert_ne!(other.value(told), moment);
         let age = other.text("#moment strong");
         assert!(!age.contains('-') && !age.contains(" h ago"), "{age}");
+        // The minute before it has as many samples as for who has the right time.
+        let count = wait_for("the samples of the minute before", || {
+            let count = other.value(
+                "told[Object.keys(told).find((asked) => asked.startsWith('/lines?'))] ?? null",
+            );
+            count.as_u64()
+        });
+        assert!(count > 10, "{count}");
+        assert_eq!(*samples.get_or_insert(count), count, "{minutes} min");
         other.click("#tab-log");
         wait_for("all that has happened", || {
             (other.value(entries).as_u64() >= known).then_some(())
@@ -104,7 +126,40 @@ pub(crate) fn a_past_moment_is_marked_orders_nothing_and_is_the_same_on_another_
             "[...document.querySelector('#time-line .ticks').getAttribute('d').matchAll(/M([0-9]+).5/g)].some(\
              ([, x]) => x > document.querySelector('#time-line').clientWidth * 0.7)",
         );
+        if minutes == 0 {
+            // The time below the signals is of the same zone.
+            other.click("#time-now");
+            other.click("#tab-signals");
+            let late = "(() => { const text = written.findLast((text) => /^[0-9]+:[0-9]+:[0-9]+$/.test(text)); \
+                 if (!text) return null; \
+                 const [hour, minute] = text.split(':').map(Number); const now = new Date(); \
+                 return (now.getHours() * 60 + now.getMinutes() - hour * 60 - minute + 1440) % 1440; })()";
+            let late = wait_for("the newest time of the axis", || other.value(late).as_u64());
+            assert!(late <= 15, "{late} min before now");
+            assert_eq!(other.value("new Date().getTimezoneOffset()"), -330);
+        }
         other.close();
+    }
+
+    // The strips show the figures of that moment, not those of now.
+    let figures = "(async () => { \
+         const at = Date.parse(decodeURIComponent(location.hash.slice(4))); \
+         const answer = await fetch(`history/moment?robot=r1&at=${at}`); \
+         const state = (await answer.text()).split('\\n').map((line) => line && JSON.parse(line).line) \
+           .find((line) => line.startsWith('state ')); \
+         const figure = (key) => Number(state.match(` ${key}=([0-9-]+)`)[1]); \
+         const duty = (side) => Math.round(figure(`${side}_duty`) / 2.55); \
+         window.figures = [` ${duty('left')} / ${duty('right')} %`, \
+           ` ${(figure('battery_dv') / 10).toFixed(1)} V`, String(duty('left') + duty('right') > 0)]; \
+         })()";
+    page.value(figures);
+    page.wait_until("window.figures !== undefined");
+    assert_eq!(page.value("figures[2]"), "true", "it drove then");
+    for (at, strip) in ["duty", "battery"].into_iter().enumerate() {
+        let told = page.text(&format!("#strips [data-lane={strip}]"));
+        let figure = page.value(&format!("figures[{at}]"));
+        let figure = figure.as_str().expect("words");
+        assert!(told.ends_with(figure), "{told}, {figure}");
     }
 
     // The map that shows the past orders nothing; STOP is of now.
@@ -156,6 +211,41 @@ pub(crate) fn a_past_moment_is_marked_orders_nothing_and_is_the_same_on_another_
         page.value("document.body.classList.contains('past')"),
         false
     );
+}
+
+pub(crate) fn a_clock_that_is_five_minutes_fast_makes_nothing_old_and_no_hold_longer(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    wrong_clock(page, 5);
+    page.call("Page.reload", &json!({}));
+    page.wait_for("#link", " ms");
+    let is_old = "document.body.classList.contains('stale')";
+    assert_eq!(page.value(is_old), false);
+    // Nobody is in the future, or five minutes ago.
+    let ages = page.text("#told") + &page.text("#state") + &page.text("#link");
+    assert!(!ages.contains('-') && !ages.contains("5 min"), "{ages}");
+    scene.arm(page);
+    let mut right = scene.page();
+    right.click("#tab-drive");
+    right.wait_for("#control", "drives");
+    scene.hold(page, "ArrowLeft");
+    page.key_up("ArrowLeft");
+    scene.wait_to_stand();
+    // What it was told last grows old as for anybody, and the robot stands when nobody renews.
+    scene.hold(page, "ArrowLeft");
+    let frozen = scene.freeze("comm");
+    page.wait_until(is_old);
+    scene.wait_to_stand();
+    page.key_up("ArrowLeft");
+    drop(frozen);
+    page.wait_until(&format!("!{is_old}"));
+    scene.assert_stands();
+    // Who leaves the wheel leaves it at once.
+    page.click("#tab-drive");
+    page.click("#control");
+    right.wait_for("#control", "Nobody drives");
+    right.close();
 }
 
 #[test]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use lager_home::Clock;
-use lager_rig::{Board, answer_to, wheels_in_the_air};
-use lager_wire::{BoardStatus, Callsign, Payload, ResetCause, SettingStatus, SteerCommand};
+use lager_rig::{Board, wheels_in_the_air};
+use lager_wire::{BoardStatus, Callsign, Payload, ResetCause, SteerCommand};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 /// A sensor board and a steering board that stands still.
@@ -54,21 +54,14 @@ impl Boards {
         let _ = poll(&mut fds, Some(&timeout));
         let _ = self.sensor.answer(|_| ());
         let (commands, written) = (&mut self.commands, &mut self.written);
-        let mut answers = Vec::new();
         let _ = self.steering.answer(|payload| {
             *written += 1;
-            if let Payload::Setting(setting) = payload {
-                answers.push(answer_to(&setting, SettingStatus::Accepted));
-            }
             if let Payload::SteerCommand(command) = payload
                 && commands.last() != Some(&command)
             {
                 commands.push(command);
             }
         });
-        for answer in answers {
-            say(&mut self.steering, answer);
-        }
         // Not a frame: nothing of it is published on the bus.
         let told = self.sensor.speak(STATUS);
         self.statuses += u64::from(told.unwrap_or(false));

@@ -25,12 +25,14 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     ("lager-battery", &[]),
     ("lager-ax12", &[]),
     ("lager-exde", &[]),
+    ("lager-pins", &[]),
     (
         "lager-plant",
         &["lager-ax12", "lager-floor", "lager-orders"],
     ),
     ("lager-pty", &[]),
     ("lager-control", &["lager-ax12", "lager-exde", "lager-wire"]),
+    ("lager-loader", &["lager-wire"]),
     (
         "lager-topics",
         &["lager-floor", "lager-orders", "lager-sample", "lager-wire"],
@@ -235,6 +237,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-gateway",
             "lager-home",
             "lager-lines",
+            "lager-loader",
             "lager-logic",
             "lager-monitor",
             "lager-operator",

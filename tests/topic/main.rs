@@ -237,7 +237,13 @@ fn rates_delays_bytes_and_fields_are_shown_for_as_long_as_is_asked() {
         let samples: u64 = windows.iter().filter_map(|w| w["samples"].as_u64()).sum();
         assert_eq!(samples, 30, "{tool}: {windows:?}");
     }
-    assert_eq!(json(&["echo", "sensor/line", "--count", "30"]).len(), 30);
+    let echoed = json(&["echo", "sensor/line", "--count", "30"]);
+    assert_eq!(echoed.len(), 30);
+    // What each of the eleven sensors sees is told unasked.
+    for sample in &echoed {
+        let bits = sample["payload"]["bits"].as_u64();
+        assert!(bits.is_some_and(|bits| bits < 1 << 11), "{sample}");
+    }
     let began = std::time::Instant::now();
     let windows = json(&["hz", "sensor/line", "--duration", "1.5"]);
     assert_eq!(windows.len(), 2, "{windows:?}");

@@ -143,6 +143,12 @@ impl Home {
         Lock::take(&path, unit, part, SUCCESSION)
     }
 
+    /// Whether a process plays `part` in a unit at present.
+    pub fn is_held(&self, unit: &UnitName, part: impl Into<Part>) -> bool {
+        let part = part.into().name();
+        lock::is_held(&self.folder_of(unit).join(format!("{part}.lock")))
+    }
+
     /// Makes this process the only supervisor of a unit, until the lock is dropped.
     ///
     /// # Errors

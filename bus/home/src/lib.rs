@@ -5,12 +5,14 @@
 //!
 //! * [`Home`] is the folder. A unit, such as a robot, has a [`UnitName`] and a folder of its own.
 //! * [`Lock`] says which process plays a part. [`Home::up`] says which processes run.
-//! * [`Watched`] is a service that a supervisor keeps alive.
+//! * [`Watched`] is a service that a supervisor keeps alive. [`Home::asked`] is what people have
+//!   ordered in a terminal.
 //! * [`Clock`] shows the unit's time. [`Life`] is a process's sign that it goes on, and [`Chance`]
 //!   says for how much of a silence the process could have run at all.
 //! * [`mend()`] removes the files that killed processes have left. [`Inventory`] notices missing
 //!   files, [`BusWatch`] every change. [`Shortage`] says which resource is used up.
 
+mod asked;
 mod chance;
 mod changes;
 mod clock;

@@ -150,6 +150,15 @@ impl Drop for Lock {
     }
 }
 
+/// Whether a process holds the lock at `path`. Whoever takes the lock at this very moment waits for
+/// its turn.
+pub(crate) fn is_held(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| {
+        let asked = flock(&file, FlockOperation::NonBlockingLockShared);
+        asked == Err(Errno::WOULDBLOCK)
+    })
+}
+
 /// Removes a lock file that a killed process has left.
 pub(crate) fn sweep(path: &Path) {
     if let Ok(file) = File::open(path)
@@ -207,6 +216,28 @@ mod tests {
         assert!(lock.is_in_place());
         drop(lock);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn others_see_whether_it_is_held_and_do_not_hinder_its_next_owner() {
+        let (path, unit) = (scene("f"), UnitName::default());
+        assert!(!is_held(&path));
+        let lock = Lock::take(&path, &unit, "boards", Duration::ZERO).unwrap();
+        assert!(is_held(&path));
+        drop(lock);
+        // A file that a killed process has left is not a lock.
+        fs::write(&path, "4711").unwrap();
+        assert!(!is_held(&path));
+        std::thread::scope(|scope| {
+            let looker = scope.spawn(|| {
+                for _ in 0..2_000 {
+                    is_held(&path);
+                }
+            });
+            while !looker.is_finished() {
+                drop(Lock::take(&path, &unit, "boards", SUCCESSION).unwrap());
+            }
+        });
     }
 
     #[test]

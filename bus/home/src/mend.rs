@@ -24,8 +24,8 @@ use crate::changes::{NODES, SERVICES};
 use crate::descriptions::Descriptions;
 use crate::error::HomeError;
 use crate::home::{Home, user_name};
-use crate::in_use;
 use crate::name::UnitName;
+use crate::{asked, in_use, watched};
 
 /// The longest time between the making of a node's folder and of the first file in it.
 const CREATION: Duration = Duration::from_secs(2);
@@ -214,6 +214,18 @@ fn remove_left(path: &Path) -> bool {
     in_use::remove_unused(path)
 }
 
+impl Home {
+    /// Removes what a unit's processes have written in its folder to be read by others, and the files
+    /// in `kept`: nobody writes them any more. A file that was half written has the ending `new`.
+    pub fn forget(&self, unit: &UnitName, kept: &[&str]) {
+        let folder = self.folder_of(unit);
+        for name in [asked::FILE, watched::FILE].iter().chain(kept) {
+            let _ = fs::remove_file(folder.join(name));
+            let _ = fs::remove_file(folder.join(format!("{name}.new")));
+        }
+    }
+}
+
 /// Removes the files that killed processes have left in a unit's folder, and the folder if it is
 /// then empty. Other files stay.
 fn tidy(home: &Home, unit: &UnitName, kept: &[&str]) -> usize {
@@ -223,11 +235,9 @@ fn tidy(home: &Home, unit: &UnitName, kept: &[&str]) -> usize {
     in_use::remove_unused(&folder.join("bells"));
     // While this process holds the name, no supervisor can start.
     if let Ok(_name) = home.lock_name(unit) {
-        home.forget_watched(unit);
-        for path in kept.iter().map(|name| folder.join(name)) {
-            if fs::remove_file(&path).is_err() {
-                let _ = fs::remove_dir_all(path);
-            }
+        home.forget(unit, kept);
+        for name in kept {
+            let _ = fs::remove_dir_all(folder.join(name));
         }
     }
     let removed = before - files(&folder).count().min(before);

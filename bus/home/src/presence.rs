@@ -6,6 +6,8 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{Error, ErrorKind};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 
 use crate::home::Home;
@@ -57,11 +59,43 @@ fn holders(folder: &Path) -> Vec<Holder> {
 
 /// Whether a process has a file open.
 fn has_open(pid: u32, file: &Path) -> bool {
-    fs::read_dir(format!("/proc/{pid}/fd"))
-        .into_iter()
-        .flatten()
-        .flatten()
-        .any(|entry| fs::read_link(entry.path()).is_ok_and(|open| open == file))
+    let is_hidden = |error: &Error| error.kind() == ErrorKind::PermissionDenied;
+    let entries = match fs::read_dir(format!("/proc/{pid}/fd")) {
+        Ok(entries) => entries,
+        Err(error) => return is_hidden(&error) && has_locked(pid, file),
+    };
+    for entry in entries.flatten() {
+        match fs::read_link(entry.path()) {
+            Ok(open) if open == file => return true,
+            Err(error) if is_hidden(&error) => return has_locked(pid, file),
+            _ => {}
+        }
+    }
+    false
+}
+
+/// Whether a process has locked a file. The kernel tells everybody who has locked what, but not
+/// which files a process has open that has more rights than this one, such as a service with the
+/// right to real time.
+fn has_locked(pid: u32, file: &Path) -> bool {
+    let Ok(metadata) = fs::metadata(file) else {
+        return false;
+    };
+    let locks = fs::read_to_string("/proc/locks").unwrap_or_default();
+    locks
+        .lines()
+        .any(|lock| is_lock_of(lock, pid, metadata.ino()))
+}
+
+/// Whether a line of `/proc/locks` tells of this process and of a file with this number:
+/// `3: FLOCK  ADVISORY  WRITE 4711 00:1a:67 0 EOF`.
+fn is_lock_of(line: &str, pid: u32, number: u64) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let ["FLOCK", _, "WRITE", holder, place, ..] = words.get(1..).unwrap_or_default() else {
+        return false;
+    };
+    let of_file = place.rsplit(':').next();
+    holder.parse() == Ok(pid) && of_file.and_then(|it| it.parse().ok()) == Some(number)
 }
 
 /// Whether a process is stopped by a signal or by a debugger.
@@ -79,7 +113,36 @@ fn is_frozen(pid: u32) -> bool {
 mod tests {
     use std::fs::File;
 
+    use rustix::fs::{FlockOperation, flock};
+
     use super::*;
+
+    #[test]
+    fn a_lock_is_found_among_those_that_the_kernel_tells() {
+        let line = "3: FLOCK  ADVISORY  WRITE 4711 00:1a:67 0 EOF";
+        assert!(is_lock_of(line, 4_711, 67));
+        assert!(!is_lock_of(line, 4_712, 67));
+        assert!(!is_lock_of(line, 4_711, 1_167));
+        // Somebody waits for it.
+        assert!(!is_lock_of(
+            "3: -> FLOCK ADVISORY WRITE 4711 00:1a:67 0 EOF",
+            4_711,
+            67
+        ));
+        assert!(!is_lock_of(
+            "4: POSIX  ADVISORY  WRITE 4711 00:1a:67 0 EOF",
+            4_711,
+            67
+        ));
+        assert!(!is_lock_of("", 4_711, 67));
+        let path = std::env::temp_dir().join(format!("lager-locked-{}", std::process::id()));
+        let file = File::create(&path).expect("a temporary file");
+        let own = std::process::id();
+        assert!(!has_locked(own, &path));
+        flock(&file, FlockOperation::LockExclusive).expect("a lock");
+        assert!(has_locked(own, &path));
+        fs::remove_file(&path).expect("its own file");
+    }
 
     #[test]
     fn a_lock_is_held_by_who_is_named_in_it_and_has_it_open() {

@@ -15,7 +15,7 @@ use std::{fs, io};
 use crate::home::Home;
 use crate::name::UnitName;
 
-const FILE: &str = "services";
+pub(crate) const FILE: &str = "services";
 
 /// A service that a supervisor keeps alive.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -57,11 +57,6 @@ impl Home {
     pub fn watched(&self, unit: &UnitName) -> Vec<Watched> {
         let text = fs::read_to_string(self.folder_of(unit).join(FILE)).unwrap_or_default();
         text.lines().filter_map(read).collect()
-    }
-
-    /// Removes what was written: the supervisor ends.
-    pub fn forget_watched(&self, unit: &UnitName) {
-        let _ = fs::remove_file(self.folder_of(unit).join(FILE));
     }
 }
 
@@ -105,7 +100,7 @@ mod tests {
         let services = [service("bridge", Some(4711), 0), service("logic", None, 2)];
         home.write_watched(&unit, &services).expect("a file");
         assert_eq!(home.watched(&unit), services);
-        home.forget_watched(&unit);
+        home.forget(&unit, &[]);
         assert_eq!(home.watched(&unit), []);
         home.remove();
     }

@@ -112,8 +112,8 @@
 //!                                      sentence; see `lager_orders::Reason`
 //!
 //! <event> ::= in_position | getting_item | item_delivered | next_node | refused
-//!           | pickup_refused | failed | way_blocked | stopped | resumed | mode | restarted
-//!           | link_lost | link_back
+//!           | pickup_refused | failed | way_blocked | stopped | resumed | mode | asked
+//!           | ended | restarted | link_lost | link_back
 //! ```
 //!
 //! Bucket 0 of `latency` holds times up to 256 ns, and bucket i from 1 to 88 times up to

@@ -39,6 +39,7 @@ class ResetCause(enum.IntEnum):
     Watchdog = 4
     Panic = 5
     Jtag = 6
+    Ordered = 7
 
 
 class Mode(enum.IntEnum):
@@ -61,9 +62,10 @@ class Refusal(enum.IntEnum):
     Stale = 11
     ArmUnlimited = 12
     FullSpeedOnly = 13
+    Undescribed = 14
 
 
-class ArmProfileState(enum.IntEnum):
+class ProfileState(enum.IntEnum):
     NoBoard = 0
     Telling = 1
     Accepted = 2
@@ -87,6 +89,7 @@ class StopCause(enum.IntEnum):
     BoardResets = 4
     WordRemoved = 5
     WordDamaged = 6
+    BoardWork = 7
 
 
 class Role(enum.IntEnum):
@@ -263,6 +266,7 @@ class InputKind(enum.IntEnum):
     WayBlocked = 16
     WayOpened = 17
     GoodsGoneEarlier = 18
+    StartPressed = 19
 
 
 class GoneWhy(enum.IntEnum):
@@ -348,6 +352,11 @@ class ThoughtKind(enum.IntEnum):
     AllGoodsBack = 60
     GoodsGone = 61
     Honks = 62
+    StartedByReset = 63
+    ResetKeepsStop = 64
+    ResetUnheard = 65
+    ResetWithoutMap = 66
+    ResetElsewhere = 67
 
 
 class Joint(enum.IntEnum):
@@ -474,7 +483,7 @@ class SteeringReport(Layout):
 
 class BoardHealth(Layout):
     _type_name_ = "lager::BoardHealth"
-    _hash_ = 0xE4D173C587C7B315
+    _hash_ = 0xA7A4970AA1065E8A
     _fields_ = [
         ("epoch", ctypes.c_uint32),
         ("packets", ctypes.c_uint32),
@@ -488,6 +497,7 @@ class BoardHealth(Layout):
         ("version", ctypes.c_uint8),
         ("reset_cause", ctypes.c_uint8),
         ("port", ctypes.c_uint8),
+        ("build", ctypes.c_uint16),
         ("board_bad_packets", ctypes.c_uint8),
         ("board_lost", ctypes.c_uint8),
         ("board_refused", ctypes.c_uint8),
@@ -495,13 +505,13 @@ class BoardHealth(Layout):
         ("board_servo_timeouts", ctypes.c_uint8),
         ("board_load_percent", ctypes.c_uint8),
         ("board_longest_loop_100us", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 5),
+        ("reserved", ctypes.c_uint8 * 3),
     ]
     _enums_ = {"reset_cause": ResetCause}
     _dtype_ = {
-        "names": ["epoch", "packets", "lost", "lost_total", "bad_crc", "skipped_bytes", "reboots", "baud", "up", "version", "reset_cause", "port", "board_bad_packets", "board_lost", "board_refused", "board_exde_errors", "board_servo_timeouts", "board_load_percent", "board_longest_loop_100us", "reserved"],
-        "formats": ["<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (5,))],
-        "offsets": [0, 4, 8, 12, 16, 20, 24, 28, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43],
+        "names": ["epoch", "packets", "lost", "lost_total", "bad_crc", "skipped_bytes", "reboots", "baud", "up", "version", "reset_cause", "port", "build", "board_bad_packets", "board_lost", "board_refused", "board_exde_errors", "board_servo_timeouts", "board_load_percent", "board_longest_loop_100us", "reserved"],
+        "formats": ["<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u1", "<u1", "<u1", "<u1", "<u2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,))],
+        "offsets": [0, 4, 8, 12, 16, 20, 24, 28, 32, 33, 34, 35, 36, 38, 39, 40, 41, 42, 43, 44, 45],
         "itemsize": 48,
     }
 
@@ -526,7 +536,7 @@ class CalibratedSensor(Layout):
 
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0x352F6A4FCC6A2698
+    _hash_ = 0x6CB76F6BF9486FB2
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),
@@ -560,14 +570,16 @@ class Health(Layout):
         ("stop_cause", ctypes.c_uint8),
         ("stop_origin", ctypes.c_uint8),
         ("mode_chosen", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 1),
+        ("steering_profile", ctypes.c_uint8),
+        ("sensor_profile", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 7),
     ]
-    _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ArmProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role}
+    _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role, "steering_profile": ProfileState, "sensor_profile": ProfileState}
     _dtype_ = {
-        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "stop_word", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
-        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", ("<u1", (1,))],
-        "offsets": [0, 48, 96, 104, 112, 120, 128, 132, 136, 140, 144, 148, 150, 152, 154, 155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 212, 213, 214, 215],
-        "itemsize": 216,
+        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "stop_word", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "steering_profile", "sensor_profile", "reserved"],
+        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (7,))],
+        "offsets": [0, 48, 96, 104, 112, 120, 128, 132, 136, 140, 144, 148, 150, 152, 154, 155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 212, 213, 214, 215, 216, 217],
+        "itemsize": 224,
     }
 
 
@@ -593,7 +605,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x470296B29CD108E7
+    _hash_ = 0x351FF1E8976199D4
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -631,13 +643,14 @@ class NavigatorStatus(Layout):
         ("arm_moves", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
         ("pick", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 2),
+        ("at_start", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8),
     ]
     _enums_ = {"phase": Phase, "step": Step, "heading": Heading, "target": Heading, "goal": Goal, "mode": Mode, "hold": Hold, "remedy": Remedy, "pick": Pick}
     _dtype_ = {
-        "names": ["frames_lost", "frames", "driven_by_hand", "order_id", "product", "command_id", "delivered", "travelled_mm", "exit_mm", "failure", "x", "y", "turned_deg", "distance_age_ms", "phase", "step", "heading", "target", "goal", "mark", "code", "tries", "misses", "waiting", "distance_cm", "mode", "stopped", "hold", "forced", "doubt", "doubt_x", "doubt_y", "arm_attempt", "arm_moves", "remedy", "pick", "reserved"],
-        "formats": ["<u8", "<u8", "<u8", "<u4", "<i4", "<u4", "<u4", "<i4", "<i4", Failure._dtype_, "<i2", "<i2", "<i2", "<u2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,)), ("<u1", (3,)), "<u1", "<u1", "<u1", "<u1", ("<u1", (2,))],
-        "offsets": [0, 8, 16, 24, 28, 32, 36, 40, 44, 48, 60, 62, 64, 66, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 87, 90, 91, 92, 93, 94],
+        "names": ["frames_lost", "frames", "driven_by_hand", "order_id", "product", "command_id", "delivered", "travelled_mm", "exit_mm", "failure", "x", "y", "turned_deg", "distance_age_ms", "phase", "step", "heading", "target", "goal", "mark", "code", "tries", "misses", "waiting", "distance_cm", "mode", "stopped", "hold", "forced", "doubt", "doubt_x", "doubt_y", "arm_attempt", "arm_moves", "remedy", "pick", "at_start", "reserved"],
+        "formats": ["<u8", "<u8", "<u8", "<u4", "<i4", "<u4", "<u4", "<i4", "<i4", Failure._dtype_, "<i2", "<i2", "<i2", "<u2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,)), ("<u1", (3,)), "<u1", "<u1", "<u1", "<u1", "<u1", "<u1"],
+        "offsets": [0, 8, 16, 24, 28, 32, 36, 40, 44, 48, 60, 62, 64, 66, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 87, 90, 91, 92, 93, 94, 95],
         "itemsize": 96,
     }
 
@@ -813,7 +826,7 @@ class Order(Layout):
 
 class Input(Layout):
     _type_name_ = "lager::Input"
-    _hash_ = 0x5051A29C9CD25DBE
+    _hash_ = 0xF9BE022D27A76723
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -833,7 +846,7 @@ class Input(Layout):
 
 class NavigatorInputs(Layout):
     _type_name_ = "lager::NavigatorInputs"
-    _hash_ = 0x768F8BE842861A93
+    _hash_ = 0xB3ED62C631044A15
     _fields_ = [
         ("first", ctypes.c_uint64),
         ("commands", Sent),
@@ -943,7 +956,7 @@ class Event(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0xDC9B4EDA7934FA9A
+    _hash_ = 0xFDFDE4D837284D31
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),

@@ -36,6 +36,7 @@ class ResetCause(enum.IntEnum):
     Watchdog = 4
     Panic = 5
     Jtag = 6
+    Ordered = 7
 
 class Mode(enum.IntEnum):
     Manual = 0
@@ -56,8 +57,9 @@ class Refusal(enum.IntEnum):
     Stale = 11
     ArmUnlimited = 12
     FullSpeedOnly = 13
+    Undescribed = 14
 
-class ArmProfileState(enum.IntEnum):
+class ProfileState(enum.IntEnum):
     NoBoard = 0
     Telling = 1
     Accepted = 2
@@ -79,6 +81,7 @@ class StopCause(enum.IntEnum):
     BoardResets = 4
     WordRemoved = 5
     WordDamaged = 6
+    BoardWork = 7
 
 class Role(enum.IntEnum):
     Bridge = 0
@@ -242,6 +245,7 @@ class InputKind(enum.IntEnum):
     WayBlocked = 16
     WayOpened = 17
     GoodsGoneEarlier = 18
+    StartPressed = 19
 
 class GoneWhy(enum.IntEnum):
     Delivered = 0
@@ -324,6 +328,11 @@ class ThoughtKind(enum.IntEnum):
     AllGoodsBack = 60
     GoodsGone = 61
     Honks = 62
+    StartedByReset = 63
+    ResetKeepsStop = 64
+    ResetUnheard = 65
+    ResetWithoutMap = 66
+    ResetElsewhere = 67
 
 class Joint(enum.IntEnum):
     Base = 0
@@ -398,6 +407,7 @@ class BoardHealth(Layout):
     version: int
     reset_cause: int
     port: int
+    build: int
     board_bad_packets: int
     board_lost: int
     board_refused: int
@@ -446,6 +456,8 @@ class Health(Layout):
     stop_cause: int
     stop_origin: int
     mode_chosen: int
+    steering_profile: int
+    sensor_profile: int
     reserved: Sequence[int]
 
 class Failure(Layout):
@@ -493,7 +505,8 @@ class NavigatorStatus(Layout):
     arm_moves: int
     remedy: int
     pick: int
-    reserved: Sequence[int]
+    at_start: int
+    reserved: int
 
 class MapProduct(Layout):
     id: int

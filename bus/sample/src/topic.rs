@@ -197,7 +197,8 @@ pub struct Application {
     pub family: &'static str,
     /// Its topics, in the order in which tools list them. Topics that are not listed work too.
     pub topics: &'static [TopicEntry],
-    /// The files and folders that its supervisor keeps in a unit's folder while the unit is up.
+    /// The files and folders that its supervisor keeps in a unit's folder while the unit is up. A
+    /// file with one of these names and the ending `new` is half of one.
     pub kept: &'static [&'static str],
 }
 

@@ -127,6 +127,12 @@ impl Stop {
         self.is_sound().then(|| Role::of_code(code)).flatten()
     }
 
+    /// Whether `up` has set it because real boards start stopped. Any other stop says that a person
+    /// or a part of the robot has seen a reason to stop.
+    pub fn is_of_fresh_start(self) -> bool {
+        (self.origin(), self.cause()) == (Some(Role::Supervisor), StopCause::FreshStart)
+    }
+
     /// When the stop was set, in ns of `CLOCK_MONOTONIC`; 0 if the word does not contain it.
     pub fn at_ns(self) -> u64 {
         match self.is_sound() {

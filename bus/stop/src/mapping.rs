@@ -70,7 +70,8 @@ impl Page {
         &self.path
     }
 
-    /// Sets a stop of the bridge's own, unless a stop is set.
+    /// Sets a stop of the bridge's own, unless one is set that only a resume ends. The stop of a
+    /// fresh start gives way, because a press of reset ends it.
     pub(crate) fn stop(&self, cause: StopCause) {
         set_unless_set(self.word(), cause);
     }
@@ -151,7 +152,10 @@ fn stop_in(file: &File, cause: StopCause) -> Result<(), Error> {
 
 fn set_unless_set(word: &AtomicU64, cause: StopCause) {
     let stop = Stop::new(Role::Bridge, cause, Clock::monotonic_ns());
-    let _ = word.compare_exchange(0, stop.word(), Ordering::AcqRel, Ordering::Acquire);
+    let _ = word.fetch_update(Ordering::AcqRel, Ordering::Acquire, |set| {
+        let gives_way = Stop::of_word(set).is_none_or(Stop::is_of_fresh_start);
+        gives_way.then_some(stop.word())
+    });
 }
 
 /// Maps the file, at an address of the kernel's choice or over the mapping at `over`.

@@ -92,7 +92,7 @@ impl StopPage {
         Stop::of_word(self.heeded)
     }
 
-    /// Sets a stop of the bridge's own, unless a stop is set.
+    /// Sets a stop of the bridge's own, unless one is set that only a resume ends.
     pub fn stop(&self, cause: StopCause) {
         self.page.stop(cause);
     }
@@ -234,6 +234,23 @@ mod tests {
         super::super::put(&file, at::WORD, 0).unwrap();
         assert_eq!(page.news(), None);
         assert_eq!(told(&path).stop(), Some(stop));
+    }
+
+    #[test]
+    fn a_stop_of_the_bridge_takes_the_place_of_a_fresh_start_and_of_no_other() {
+        let folder = Folder::new();
+        let path = folder.path().join("stop");
+        let page = page(&path, false);
+        let fresh = StopWord::set(&path, Role::Supervisor, StopCause::FreshStart).unwrap();
+        assert!(fresh.is_of_fresh_start());
+        page.stop(StopCause::BoardResets);
+        let fault = told(&path).stop().expect("a stop");
+        assert_eq!(fault.cause(), StopCause::BoardResets);
+        page.stop(StopCause::StateLost);
+        assert_eq!(told(&path).stop(), Some(fault));
+        let ordered = set(&path);
+        page.stop(StopCause::BoardResets);
+        assert_eq!(told(&path).stop(), Some(ordered));
     }
 
     #[test]

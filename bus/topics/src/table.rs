@@ -31,18 +31,13 @@ pub static LAGER: Application = Application {
     topics: TOPICS,
     kept: &[
         "lager.toml",
-        "lager.toml.new",
         "sensor.tty",
         "steering.tty",
         "clock",
         "eeprom",
         "gag",
         "secret",
-        "secret.new",
-        "warehouse.toml",
-        "warehouse.toml.new",
-        "warehouse.toml.queue",
-        "warehouse.toml.queue.new",
+        "queue.toml",
     ],
 };
 

@@ -7,7 +7,7 @@ use lager_topics::{
     Role, Route, RouteNode, SERVO_UNKNOWN, SteeringReport, TOPICS, Thought, ThoughtKind,
     TopicVisitor, Truth, WarehouseMap, visit,
 };
-use lager_wire::LineState;
+use lager_wire::{BUILD, LineState};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -128,6 +128,7 @@ fn what_has_not_been_heard_is_marked_as_unknown() {
     assert_eq!(report.servo_position, [SERVO_UNKNOWN; 8]);
     assert_eq!(report.finish, Finish::None);
     assert_eq!(BoardHealth::default().version, BoardHealth::UNKNOWN);
+    assert_eq!(BoardHealth::default().misfit(), None);
     assert_eq!(Health::default().gain_p, Health::NEVER_SET);
     assert_eq!(Health::default().gain_d, Health::NEVER_SET);
     assert_eq!(Truth::default().carrying, -1);
@@ -170,5 +171,30 @@ fn fields_lie_without_gaps() {
             end += field.size;
         }
         assert_eq!(end, topic.layout.size, "{}", topic.name);
+    }
+}
+
+#[test]
+fn an_image_that_does_not_fit_is_named_with_what_helps_and_an_original_board_is_no_fault() {
+    let said = |version, build| {
+        let board = BoardHealth {
+            version,
+            build,
+            ..BoardHealth::default()
+        };
+        board.misfit().map(|misfit| misfit.to_string())
+    };
+    assert_eq!(said(1, BUILD), None);
+    assert_eq!(said(0, 0), None, "an original board");
+    for (build, helps) in [
+        (0, "`lager board update`"),
+        (BUILD - 1, "`lager board update`"),
+        (BUILD + 1, "install the newer program"),
+    ] {
+        let said = said(1, build).expect("it does not fit");
+        for words in [format!("build {build},"), format!("build {BUILD};")] {
+            assert!(said.contains(&words), "{said}");
+        }
+        assert!(said.contains(helps), "{said}");
     }
 }

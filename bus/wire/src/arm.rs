@@ -17,7 +17,7 @@
 
 mod rules;
 
-use crate::crc::checksum;
+use crate::profile::{Profile, profile};
 use crate::setting::SettingKey;
 
 pub use rules::ArmProfileError;
@@ -113,46 +113,6 @@ impl ArmPose {
     };
 }
 
-/// Declares a profile, which is also a section of the configuration: its keys, their defaults, and
-/// the explanations that `lager config` prints.
-macro_rules! profile {
-    (
-        $(#[doc = $about:literal])*
-        pub struct $name:ident {
-            $(
-                $(#[doc = $explained:literal])*
-                pub $key:ident: $kind:ty = $default:expr,
-            )*
-        }
-    ) => {
-        $(#[doc = $about])*
-        // The file has [lowest, highest] for limits, which is no link.
-        #[allow(rustdoc::broken_intra_doc_links)]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-        #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
-        pub struct $name {
-            $(
-                $(#[doc = $explained])*
-                pub $key: $kind,
-            )*
-        }
-
-        impl Default for $name {
-            fn default() -> Self {
-                Self { $($key: $default,)* }
-            }
-        }
-
-        impl $name {
-            /// The lines that explain the section to a person.
-            pub const ABOUT: &[&str] = &[$($about),*];
-            /// The keys of the section, each with the lines that explain it.
-            pub const KEYS: &[(&str, &[&str])] = &[$((stringify!($key), &[$($explained),*])),*];
-        }
-    };
-}
-
 profile! {
     /// What the arm may do; the steering board is told at every start, and the arm stands until
     /// the board has taken it. Positions are those of the servos, 0 to 1023, 0.29 degrees each;
@@ -206,12 +166,7 @@ impl ArmProfile {
         Ok(())
     }
 
-    /// The same check for the values that a board has received. It takes less room than the reason.
-    pub fn is_sound(values: &[u16; Self::VALUES]) -> bool {
-        broken(values).is_none()
-    }
-
-    /// The values that a board receives, in the order of [`ArmProfile::key`].
+    /// The values that a board receives, in the order of [`Profile::key`].
     pub const fn values(&self) -> [u16; Self::VALUES] {
         let limits = &self.limits;
         [
@@ -263,36 +218,24 @@ impl ArmProfile {
             carry: neutral,
         }
     }
+}
 
-    /// The setting that carries value `index` of [`ArmProfile::values`].
-    pub fn key(index: usize) -> Option<SettingKey> {
-        let code = u8::try_from(index).ok()?.checked_add(FIRST)?;
-        SettingKey::from_code(code).filter(|key| Self::index(*key).is_some())
+impl Profile for ArmProfile {
+    type Values = [u16; Self::VALUES];
+    const FIRST: SettingKey = SettingKey::ArmTorqueLimit;
+    const CHECK: SettingKey = SettingKey::ArmProfile;
+
+    fn told(&self) -> Self::Values {
+        self.values()
     }
 
-    /// The index in [`ArmProfile::values`] of the value that a setting carries, if it carries one.
-    pub const fn index(key: SettingKey) -> Option<usize> {
-        let code = key.code();
-        if code >= FIRST && code <= LAST {
-            Some((code - FIRST) as usize)
-        } else {
-            None
-        }
-    }
-
-    /// The check value of a profile's values, as [`SettingKey::ArmProfile`] carries it: 0 to 255.
-    pub fn check(values: &[u16; Self::VALUES]) -> i16 {
-        let mut bytes = [0; 2 * Self::VALUES];
-        for (pair, value) in bytes.chunks_exact_mut(2).zip(values) {
-            pair.copy_from_slice(&value.to_le_bytes());
-        }
-        checksum(&bytes).into()
+    fn obeyed(values: &Self::Values) -> Option<Self> {
+        broken(values).is_none().then(|| Self::from_values(values))
     }
 }
 
-const FIRST: u8 = SettingKey::ArmTorqueLimit.code();
 const LAST: u8 = SettingKey::ArmDropWrist.code();
-const _: () = assert!((LAST - FIRST + 1) as usize == ArmProfile::VALUES);
+const _: () = assert!((LAST - ArmProfile::FIRST.code() + 1) as usize == ArmProfile::VALUES);
 
 const fn limits(values: &[u16; ArmProfile::VALUES], at: usize) -> ArmLimits {
     ArmLimits {

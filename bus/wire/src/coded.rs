@@ -10,9 +10,9 @@ macro_rules! coded {
             $( $(#[$variant_meta:meta])* $variant:ident = $code:literal, )*
         }
     ) => {
-        $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        $(#[$meta])*
         #[repr(u8)]
         pub enum $name {
             $( $(#[$variant_meta])* $variant = $code, )*

@@ -17,6 +17,15 @@ pub fn checksum(bytes: &[u8]) -> u8 {
     CRC.checksum(bytes)
 }
 
+/// The check value of `values`, each with its low byte first.
+pub(crate) fn checksum_of(values: &[u16]) -> u8 {
+    let mut digest = CRC.digest();
+    for value in values {
+        digest.update(&value.to_le_bytes());
+    }
+    digest.finalize()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

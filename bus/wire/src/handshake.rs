@@ -5,13 +5,21 @@
 //! payload byte 1   version of the packet rules             version 1 only
 //! payload byte 2   why the board started                   version 1 only
 //! payload byte 3   1: the link has been up since start     version 1 only
-//! payload 4 to 7   0
+//! payload 4, 5     build number of a board, low byte first version 1 only
+//! payload 6, 7     0
 //! ```
 //!
 //! This file only reads and writes bytes. The link machines decide what a handshake means.
 
+use core::fmt;
+
 use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;
+
+/// The number of the boards' images that fit this source. It counts up with every change of an
+/// image that goes to robots. With some numbers (1, 3, 6, 18, 21) a handshake can look like one of an
+/// original board; the tests find these, and then the next number is taken.
+pub const BUILD: u16 = 4;
 
 coded! {
     /// The rules by which a packet is built.
@@ -34,6 +42,18 @@ coded! {
         Sensor = 2,
         /// The steering board.
         Steering = 3,
+    }
+}
+
+/// Its name in sentences and in the names of files.
+impl fmt::Display for Callsign {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(match self {
+            Self::Error => "unknown",
+            Self::Raspi => "Raspberry Pi",
+            Self::Sensor => "sensor",
+            Self::Steering => "steering",
+        })
     }
 }
 
@@ -64,6 +84,8 @@ coded! {
         Panic = 5,
         /// A debugger.
         Jtag = 6,
+        /// The Pi told it to.
+        Ordered = 7,
     }
 }
 
@@ -76,6 +98,7 @@ lager_sample::coded_as_is!(ResetCause {
     Watchdog,
     Panic,
     Jtag,
+    Ordered,
 });
 
 /// The content of a handshake packet.
@@ -94,6 +117,9 @@ pub struct Handshake {
     /// false, the board has restarted, however long it was silent before. Always `false` from the
     /// Pi and from an original board.
     pub was_up: bool,
+    /// The build number of the board's image, see [`BUILD`]. 0 from the Pi, from an original board
+    /// and from images that had no number yet.
+    pub build: u16,
 }
 
 impl Handshake {
@@ -108,6 +134,7 @@ impl Handshake {
             payload[1] = version.code();
             payload[2] = self.reset.code();
             payload[3] = self.was_up.into();
+            [payload[4], payload[5]] = self.build.to_le_bytes();
         }
     }
 
@@ -118,8 +145,8 @@ impl Handshake {
         ) else {
             return Err(Fault { index: 0 });
         };
-        let (reset, was_up) = match version {
-            Version::Original => (ResetCause::Unknown, false),
+        let (reset, was_up, build) = match version {
+            Version::Original => (ResetCause::Unknown, false, 0),
             Version::One => {
                 if sign == Callsign::Error {
                     return Err(Fault { index: 0 });
@@ -133,8 +160,9 @@ impl Handshake {
                     1 => true,
                     _ => return Err(Fault { index: 3 }),
                 };
-                unused_from(4, payload)?;
-                (reset, was_up)
+                unused_from(6, payload)?;
+                let build = u16::from_le_bytes([payload[4], payload[5]]);
+                (reset, was_up, build)
             }
         };
         Ok(Self {
@@ -143,6 +171,7 @@ impl Handshake {
             version,
             reset,
             was_up,
+            build,
         })
     }
 }

@@ -8,11 +8,12 @@ use crate::bytes::{Bytes, Fault};
 use crate::coded::coded;
 use crate::handshake::{Callsign, Handshake, Version};
 use crate::line::{Centimetres, LineBits, LineReading, LineState};
+use crate::reset::ResetOrder;
 use crate::setting::{Setting, SettingReply};
 use crate::steer::{SteerCommand, SteerData};
 
 coded! {
-    /// A packet's kind, the high nibble of its first byte (U5). 6 to 10 exist in version 1 only.
+    /// A packet's kind, the high nibble of its first byte (U5). 6 to 11 exist in version 1 only.
     pub enum Kind {
         /// SYN or ACK.
         Handshake = 0,
@@ -36,6 +37,8 @@ coded! {
         BoardStatus = 9,
         /// The readings of one line sensor during a calibration.
         LineReading = 10,
+        /// The Pi tells a board to restart.
+        Reset = 11,
     }
 }
 
@@ -59,6 +62,7 @@ impl Kind {
             | Self::SteerCommand
             | Self::Setting
             | Self::SettingReply
+            | Self::Reset
             | Self::BoardStatus => None,
         }
     }
@@ -89,6 +93,8 @@ pub enum Payload {
     BoardStatus(BoardStatus),
     /// The readings of one line sensor during a calibration.
     LineReading(LineReading),
+    /// The Pi tells a board to restart.
+    Reset(ResetOrder),
 }
 
 impl Payload {
@@ -106,6 +112,7 @@ impl Payload {
             Self::ArmData(_) => Kind::ArmData,
             Self::BoardStatus(_) => Kind::BoardStatus,
             Self::LineReading(_) => Kind::LineReading,
+            Self::Reset(_) => Kind::Reset,
         }
     }
 
@@ -122,6 +129,7 @@ impl Payload {
             Self::ArmData(data) => data.write(payload),
             Self::BoardStatus(status) => status.write(payload),
             Self::LineReading(reading) => reading.write(payload),
+            Self::Reset(order) => order.write(payload),
         }
     }
 
@@ -137,6 +145,7 @@ impl Payload {
             Kind::Handshake => Self::Handshake(Handshake::read(version, payload)?),
             Kind::SteerCommand => Self::SteerCommand(SteerCommand::read(version, payload, given)?),
             Kind::Setting => Self::Setting(Setting::read(payload)?),
+            Kind::Reset => Self::Reset(ResetOrder::read(payload)?),
             _ if !BOARDS => return Err(Fault { index: 0 }),
             Kind::LineData => Self::Line(LineState::read(version, payload)?),
             Kind::Distance => Self::Distance(Centimetres::read(version, payload)?),

@@ -5,7 +5,7 @@
 //! reply     key  seq  value low  value high  status  0     0  0
 //! ```
 //!
-//! The keys from [`SettingKey::ArmTorqueLimit`] on are the values of an [`crate::ArmProfile`].
+//! The keys from [`SettingKey::ArmTorqueLimit`] on are the values of a [`crate::Profile`].
 
 use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;
@@ -22,7 +22,7 @@ coded! {
         /// Starts the line sensor's calibration.
         Calibrate = 4,
         /// Puts the arm's profile that was sent before in force. The value is the profile's check
-        /// value ([`crate::ArmProfile::check`]).
+        /// value ([`crate::Profile::check`]).
         ArmProfile = 15,
         /// Torque limit of the arm's servos, 1 to 1023.
         ArmTorqueLimit = 16,
@@ -72,6 +72,34 @@ coded! {
         ArmDropElbow = 38,
         /// Position of the wrist in the drop pose.
         ArmDropWrist = 39,
+        /// Puts the description of the wheels that was sent before in force.
+        Steering = 48,
+        /// 1: each motor hangs at the driver of the other side.
+        SteeringSwapped = 49,
+        /// 1: the left motor turns the other way round.
+        SteeringLeftReversed = 50,
+        /// 1: the right motor turns the other way round.
+        SteeringRightReversed = 51,
+        /// Duty of a driving motor, of 255.
+        SteeringDuty = 52,
+        /// Time of a full turn on the spot, in ms.
+        SteeringFullTurn = 53,
+        /// 1: a quarter of the battery's voltage is at the board's input.
+        SteeringDivider = 54,
+        /// Puts the description of the sensors that was sent before in force.
+        Sensors = 64,
+        /// 1: a line sensor reads high over dark tape. 0: it reads low.
+        SensorsDarkHigh = 65,
+        /// The IR ranger's model, an [`crate::IrModel`].
+        SensorsIrModel = 66,
+        /// The near distance of an own curve, in cm ...
+        SensorsNearCm = 67,
+        /// ... and what the ranger reads there.
+        SensorsNearAdc = 68,
+        /// The far distance of an own curve, in cm ...
+        SensorsFarCm = 69,
+        /// ... and what the ranger reads there.
+        SensorsFarAdc = 70,
     }
 }
 

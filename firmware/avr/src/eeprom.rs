@@ -9,20 +9,25 @@ const EEPE: u8 = bit(1);
 const EEMPE: u8 = bit(2);
 
 /// Reads a byte; not allowed while a write runs.
-pub fn read(address: u8) -> u8 {
+pub fn read(address: u16) -> u8 {
     let eeprom = eeprom();
-    put(eeprom.eear(), u16::from(address));
+    put(eeprom.eear(), address);
     set(eeprom.eecr(), EERE);
     get(eeprom.eedr())
 }
 
+/// Whether a write runs.
+pub fn is_writing() -> bool {
+    get(eeprom().eecr()) & EEPE != 0
+}
+
 /// Begins to write a byte, which takes 3.4 ms. `false`: nothing happens, because a write runs.
-pub fn write(address: u8, value: u8) -> bool {
+pub fn write(address: u16, value: u8) -> bool {
     let eeprom = eeprom();
-    if get(eeprom.eecr()) & EEPE != 0 {
+    if is_writing() {
         return false;
     }
-    put(eeprom.eear(), u16::from(address));
+    put(eeprom.eear(), address);
     put(eeprom.eedr(), value);
     // The second bit must be set within four cycles of the first.
     interrupt::free(|_| {

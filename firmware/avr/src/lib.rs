@@ -6,6 +6,7 @@
 //!   -------------------------------------------------------------
 //!   sensor, steering  pins, ADC, PWM, ExDe      registers, interrupts
 //!   this library      clock, UART 0, reset
+//!   loader            its own programs: one for each board, in the boot section
 //! ```
 //!
 //! These crates only move bits. All decisions are in `lager-control` and in the crates that it
@@ -22,3 +23,17 @@ pub mod register;
 pub mod reset;
 pub mod shared;
 pub mod uart;
+
+pub use lager_loader::Header;
+
+/// Puts the header of a board's image behind its vectors, where its bootloader looks for it. The
+/// linker puts the vectors of the start files first into this section.
+#[macro_export]
+macro_rules! image_header {
+    ($role:expr) => {
+        // SAFETY: the start files have jumped before it, and nothing else is in this section.
+        #[used]
+        #[unsafe(link_section = ".vectors")]
+        static HEADER: [u8; $crate::Header::LENGTH] = $crate::Header::of($role);
+    };
+}

@@ -26,6 +26,8 @@ macro_rules! peripherals {
 peripherals! {
     /// Analog to digital converter.
     adc: ADC,
+    /// Self-programming.
+    boot_load: BOOT_LOAD,
     /// Sleep and reset flags.
     cpu: CPU,
     /// The EEPROM.

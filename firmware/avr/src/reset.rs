@@ -2,8 +2,12 @@
 //!
 //! ```text
 //!   running --64 ms without a kick--> watchdog interrupt: board made safe --16 ms--> reset
-//!   panic   --------------------------> board made safe, mark in RAM      --16 ms--> reset
+//!   panic   --------------------------> board made safe, cause in RAM     --16 ms--> reset
+//!   order   --------------------------> board made safe, cause in RAM     --16 ms--> reset
 //! ```
+//!
+//! Behind a bootloader the reset flags are in GPIOR0, because the loader has to clear MCUSR. Without
+//! one they are in MCUSR, and GPIOR0 is 0 after every reset.
 //!
 //! In the interrupt and in the panic handler the board's program makes the board safe.
 //!
@@ -17,12 +21,14 @@ use avr_device::interrupt;
 use core::arch::asm;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
-use lager_wire::ResetCause;
+use lager_loader::entry;
+use lager_wire::{ResetCause, ResetOrder};
 
 use crate::register::{cpu, get, put};
 
-/// The mark that a panic leaves in RAM for the next start.
-const PANIC_MARK: u16 = 0x9A1C;
+/// The high byte of the mark that a program leaves in RAM for the next start. The low byte is the
+/// code of the cause.
+const MARK_HIGH: u8 = 0x9A;
 
 const WDCE_WDE: u8 = 0b0001_1000;
 /// Interrupt and reset, 64 ms.
@@ -44,14 +50,19 @@ static MARK: Mark = Mark(UnsafeCell::new(MaybeUninit::uninit()));
 
 /// Starts the watchdog and returns why the board started. Call it first, with interrupts off.
 pub fn start() -> ResetCause {
-    let flags = get(cpu().mcusr());
+    let flags = get(cpu().mcusr()) | get(cpu().gpior0());
     // The watchdog cannot be changed while its reset flag is set.
     put(cpu().mcusr(), 0);
     set_watchdog(BITE_AFTER_64_MS);
     // SAFETY: only this program uses the cell; any content of the RAM after power-on is a number.
-    let panicked = unsafe { MARK.0.get().cast::<u16>().read_volatile() } == PANIC_MARK;
+    let [code, high] = unsafe { MARK.0.get().cast::<u16>().read_volatile() }.to_le_bytes();
     mark(0);
-    lager_control::reset_cause(flags, panicked)
+    let left = if high == MARK_HIGH {
+        ResetCause::from_code(code)
+    } else {
+        None
+    };
+    lager_control::reset_cause(flags, left)
 }
 
 /// Tells the watchdog that the main loop is alive.
@@ -67,8 +78,39 @@ pub fn after_hang() -> ! {
 
 /// Resets the board after a panic; the caller has made the board safe.
 pub fn after_panic() -> ! {
-    mark(PANIC_MARK);
+    leave(ResetCause::Panic);
     reset()
+}
+
+/// Resets the board because the Pi has told it to; the caller has made the board safe.
+pub fn on_order(order: ResetOrder) -> ! {
+    interrupt::disable();
+    leave(ResetCause::Ordered);
+    if order == ResetOrder::Loader {
+        // SAFETY: the place is in RAM. It was part of the stack, to which nobody returns.
+        unsafe { (entry::MARK_AT as *mut u32).write_volatile(entry::MARK) };
+    }
+    reset()
+}
+
+/// Whether the mark for the loader is in RAM, and removes it. Only the loader calls this.
+pub fn take_loader_mark() -> bool {
+    let place = entry::MARK_AT as *mut u32;
+    // SAFETY: the place is in RAM, above the loader's stack; any content of it is a number.
+    unsafe {
+        let is_there = place.read_volatile() == entry::MARK;
+        place.write_volatile(0);
+        is_there
+    }
+}
+
+/// Switches the watchdog off. MCUSR is clear and interrupts are off.
+pub fn stop_watchdog() {
+    set_watchdog(0);
+}
+
+fn leave(cause: ResetCause) {
+    mark(u16::from_le_bytes([cause.code(), MARK_HIGH]));
 }
 
 fn reset() -> ! {

@@ -22,7 +22,7 @@ const TXC: u8 = bit(6);
 const EIGHT_BITS: u8 = 0b0000_0110;
 
 /// 16 MHz / (16 * baud) - 1: exact at 500 000 Bd, 0.16 % fast at 9600.
-const UBRR: u16 = if cfg!(feature = "baud-9600") { 103 } else { 1 };
+pub const UBRR: u16 = if cfg!(feature = "baud-9600") { 103 } else { 1 };
 
 /// How many bytes can wait in each direction: five packets.
 const CAPACITY: usize = 64;

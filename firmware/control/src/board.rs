@@ -4,10 +4,10 @@
 //! and bytes, and decides nothing. No call waits for anything outside; reading a sensor takes as
 //! long as its conversion.
 
-use lager_wire::ResetCause;
+use lager_wire::{ResetCause, ResetOrder};
 
 /// How many bytes of EEPROM the boards use.
-pub const EEPROM_LENGTH: u8 = 64;
+pub const EEPROM_LENGTH: u8 = 128;
 
 /// What both boards have: a clock, the UART to the Pi, a watchdog.
 pub trait Board {
@@ -25,6 +25,9 @@ pub trait Board {
 
     /// Why the board started.
     fn reset_cause(&self) -> ResetCause;
+
+    /// Resets the board; a chip does not return from it. The caller has made the board safe.
+    fn reset(&mut self, order: ResetOrder);
 
     /// Tells the watchdog that the loop is alive.
     fn kick_watchdog(&mut self);

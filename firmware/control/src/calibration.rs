@@ -73,7 +73,7 @@ impl Calibration {
         self.watch.is_some()
     }
 
-    /// Whether this reading of a channel means tape.
+    /// Whether this reading of a channel is on the side of its threshold on which tape reads high.
     pub(crate) fn judge(&mut self, channel: usize, reading: u8) -> bool {
         if let Some(watch) = &mut self.watch {
             watch.reading[channel] = reading;

@@ -16,25 +16,15 @@
 //! far below it, but never as less than the least distance.
 //!
 //! Between two table points the inverse of the distance is linear in the voltage, as in every
-//! triangulating sensor. All numbers are integers.
+//! triangulating sensor. All numbers are integers. A ranger of none of the models has an own curve of
+//! two points, which its owner has measured.
 
-use lager_wire::Centimetres;
+use lager_wire::{Centimetres, IrModel, RangerProfile};
 
 use crate::divide::divide;
 
-/// A Sharp ranger. The document does not name the model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum IrModel {
-    /// GP2Y0A21YK0F, 10..=80 cm.
-    #[default]
-    Gp2y0a21,
-    /// GP2Y0A41SK0F, 4..=30 cm.
-    Gp2y0a41,
-    /// GP2Y0A02YK, 20..=150 cm; its table holds only the two typical voltages of the datasheet.
-    Gp2y0a02,
-}
-
 /// One point of a curve.
+#[derive(Debug, Clone, Copy)]
 struct Point {
     /// What a 10-bit ADC with a 5 V reference reads.
     adc: u16,
@@ -74,49 +64,67 @@ const GP2Y0A41: [Point; 7] = [
 /// 0.4 V at 150 cm and 2.05 V more at 20 cm, both typical.
 const GP2Y0A02: [Point; 2] = [at(501, 200), at(81, 1500)];
 
-impl IrModel {
-    /// The least distance that the model measures; smaller values are never reported.
+/// The curve of a robot's ranger.
+#[derive(Debug, Clone)]
+pub struct Curve {
+    model: IrModel,
+    /// The points of an own curve.
+    own: [Point; 2],
+    least_cm: u8,
+    most_cm: u8,
+}
+
+impl Curve {
+    /// The curve of a ranger that was described so.
     #[must_use]
-    pub const fn least_cm(self) -> u8 {
-        match self {
-            Self::Gp2y0a21 => 10,
-            Self::Gp2y0a41 => 4,
-            Self::Gp2y0a02 => 20,
+    pub const fn new(ranger: &RangerProfile) -> Self {
+        let (least_cm, most_cm) = ranger.range_cm();
+        Self {
+            model: ranger.model,
+            own: [
+                at(ranger.near_reading, ranger.near_cm as u16 * 10),
+                at(ranger.far_reading, ranger.far_cm as u16 * 10),
+            ],
+            least_cm,
+            most_cm,
         }
     }
 
-    /// The greatest distance that the model measures; farther objects read as too far.
+    /// The least distance that it measures; smaller values are never reported.
     #[must_use]
-    pub const fn most_cm(self) -> u8 {
-        match self {
-            Self::Gp2y0a21 => 80,
-            Self::Gp2y0a41 => 30,
-            Self::Gp2y0a02 => 150,
-        }
+    pub const fn least_cm(&self) -> u8 {
+        self.least_cm
+    }
+
+    /// The greatest distance that it measures; farther objects read as too far.
+    #[must_use]
+    pub const fn most_cm(&self) -> u8 {
+        self.most_cm
     }
 
     /// The distance for a reading of a 10-bit ADC with a 5 V reference.
     #[must_use]
-    pub fn distance(self, adc: u16) -> Centimetres {
+    pub fn distance(&self, adc: u16) -> Centimetres {
         let table = self.table();
         if adc >= table[0].adc {
-            return Centimetres(self.least_cm());
+            return Centimetres(self.least_cm);
         }
         let Some(pair) = table.windows(2).find(|pair| adc >= pair[1].adc) else {
             return Centimetres::NONE;
         };
         let centimetres = between(&pair[0], &pair[1], adc);
         match u8::try_from(centimetres) {
-            Ok(centimetres) if centimetres <= self.most_cm() => Centimetres(centimetres),
+            Ok(centimetres) if centimetres <= self.most_cm => Centimetres(centimetres),
             _ => Centimetres::NONE,
         }
     }
 
-    fn table(self) -> &'static [Point] {
-        match self {
-            Self::Gp2y0a21 => &GP2Y0A21,
-            Self::Gp2y0a41 => &GP2Y0A41,
-            Self::Gp2y0a02 => &GP2Y0A02,
+    fn table(&self) -> &[Point] {
+        match self.model {
+            IrModel::Own => &self.own,
+            IrModel::Gp2y0a21 => &GP2Y0A21,
+            IrModel::Gp2y0a41 => &GP2Y0A41,
+            IrModel::Gp2y0a02 => &GP2Y0A02,
         }
     }
 }

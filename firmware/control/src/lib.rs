@@ -43,6 +43,7 @@ mod steering;
 mod store;
 mod supply;
 mod time;
+mod told;
 pub mod turn;
 mod wheels;
 
@@ -50,9 +51,6 @@ pub use board::{Board, EEPROM_LENGTH, Motor, SensorBoard, SteeringBoard};
 pub use reset::reset_cause;
 pub use sensor::{SensorConfig, SensorUnit};
 pub use steering::{SteeringConfig, SteeringUnit};
-
-/// Duty of a driving motor in every mode except following (W1, `PWM_STANDARD`), of 255 (AMB-23).
-pub const PWM_STANDARD: u8 = 100;
 
 /// A board gives a packet up after this silence inside it, in microseconds: two bytes at 9600 Bd
 /// (AMB-9) and the pause that a USB adapter makes between two of its frames.

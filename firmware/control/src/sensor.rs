@@ -22,17 +22,18 @@
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
-    BoardStatus, Callsign, LineBits, Payload, ResetCause, Setting, SettingKey, SettingReply,
-    SettingStatus,
+    BoardStatus, Callsign, LineBits, Payload, Profile, ResetCause, SensorProfile, Setting,
+    SettingKey, SettingReply, SettingStatus,
 };
 
 use crate::calibration::{CHANNELS, Calibration};
-use crate::ir::IrModel;
+use crate::ir::Curve;
 use crate::line::LineReader;
 use crate::load::Load;
 use crate::replies::Replies;
-use crate::store::Store;
+use crate::store::{Place, Store};
 use crate::time::{first, reached};
+use crate::told::{self, Told};
 use crate::{
     Board, EEPROM_POLL_US, MOST_BYTES, PACKET_GAP_US, SensorBoard, UART_POLL_US, outbox::Outbox,
 };
@@ -42,8 +43,8 @@ use crate::{
 pub struct SensorConfig {
     /// Time between two passes, in microseconds; longer on a slower UART.
     pub loop_period_us: u32,
-    /// The IR ranger's model.
-    pub ir_model: IrModel,
+    /// What the board obeys until the Pi has told it its robot, which it keeps in EEPROM.
+    pub robot: SensorProfile,
     /// A line sensor that reads this or more sees tape, leftmost sensor first. A calibration
     /// replaces these thresholds and keeps its own in EEPROM.
     pub thresholds: [u8; CHANNELS],
@@ -65,7 +66,7 @@ impl SensorConfig {
 
     const USUAL: Self = Self {
         loop_period_us: 5_000,
-        ir_model: IrModel::Gp2y0a21,
+        robot: SensorProfile::USUAL,
         thresholds: [128; CHANNELS],
         // Twice a second. It is due a little before its pass, so that a few microseconds do not
         // decide which pass sends it.
@@ -109,6 +110,11 @@ pub struct SensorUnit {
     /// Which turn is next in a calibration: twice the sensor's index, plus one if it is a distance.
     turn: u8,
     store: Store<CHANNELS>,
+    robot: SensorProfile,
+    told: Told<SensorProfile>,
+    /// The robot in EEPROM.
+    robot_store: Store<12>,
+    curve: Curve,
     raw_line: bool,
     flip_flop: FlipFlop,
     pass_due_us: u32,
@@ -124,7 +130,11 @@ impl SensorUnit {
     pub fn new(board: &impl Board, config: SensorConfig) -> Self {
         let now_us = board.now_us();
         let reset = board.reset_cause();
-        let (store, thresholds) = Store::load(board);
+        let (store, thresholds) = Store::load(board, Place::Settings);
+        let (robot_store, kept) = Store::load(board, Place::Robot);
+        let robot = kept
+            .and_then(|kept| told::obeyed(&kept))
+            .unwrap_or(config.robot);
         Self {
             reset,
             link: BoardLink::new(Callsign::Sensor, reset, config.gap_us),
@@ -135,6 +145,10 @@ impl SensorUnit {
             calibration: Calibration::new(thresholds.unwrap_or(config.thresholds)),
             turn: 0,
             store,
+            told: Told::new(&robot),
+            robot_store,
+            curve: Curve::new(&robot.ranger),
+            robot,
             raw_line: false,
             flip_flop: FlipFlop::Line,
             pass_due_us: now_us,
@@ -161,6 +175,7 @@ impl SensorUnit {
             self.pass(board, now_us);
         }
         self.store.poll(board);
+        self.robot_store.poll(board);
         self.load.worked(now_us, board.now_us());
         self.next_due_us(board.now_us())
     }
@@ -178,6 +193,7 @@ impl SensorUnit {
                         let reply = self.set(setting, now_us);
                         self.replies.push(reply);
                     }
+                    Payload::Reset(order) => board.reset(order),
                     _ => self.refused = self.refused.saturating_add(1),
                 },
             }
@@ -200,7 +216,7 @@ impl SensorUnit {
                 i16::from(self.calibration.is_running()),
                 SettingStatus::OutOfRange,
             ),
-            _ => (0, SettingStatus::NotHere),
+            _ => self.hear_robot(setting),
         };
         SettingReply {
             key: setting.key,
@@ -208,6 +224,19 @@ impl SensorUnit {
             value,
             status,
         }
+    }
+
+    /// Takes in what the Pi tells of the robot, which counts once it is whole.
+    fn hear_robot(&mut self, setting: Setting) -> told::Answer {
+        let Some((answer, robot)) = self.told.hear(setting, &self.robot) else {
+            return (0, SettingStatus::NotHere);
+        };
+        if let Some(robot) = robot {
+            self.robot = robot;
+            self.curve = Curve::new(&robot.ranger);
+            self.robot_store.save(told::kept(&robot.told()));
+        }
+        answer
     }
 
     fn ask_for_pi<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
@@ -239,9 +268,9 @@ impl SensorUnit {
                 self.flip_flop = FlipFlop::Distance;
             }
             FlipFlop::Distance => {
-                let payload = self.rarer_thing(now_us).unwrap_or_else(|| {
-                    Payload::Distance(self.config.ir_model.distance(board.read_ir()))
-                });
+                let payload = self
+                    .rarer_thing(now_us)
+                    .unwrap_or_else(|| Payload::Distance(self.curve.distance(board.read_ir())));
                 self.send(board, payload);
                 self.flip_flop = FlipFlop::Line;
             }
@@ -270,7 +299,12 @@ impl SensorUnit {
             let tape = self.calibration.judge(usize::from(channel), reading);
             bits = bits << 1 | u16::from(tape);
         }
-        LineBits::new(bits)
+        // Thresholds are kept as the sensors read, so a calibration needs no polarity.
+        LineBits::new(if self.robot.line.dark_is_high {
+            bits
+        } else {
+            !bits
+        })
     }
 
     /// Sends the second answer to a calibration: how many channels have a new threshold. The status
@@ -345,9 +379,7 @@ impl SensorUnit {
             .link
             .us_to_syn(now_us)
             .map(|us| now_us.wrapping_add(us));
-        let save_us = self
-            .store
-            .is_saving()
+        let save_us = (self.store.is_saving() || self.robot_store.is_saving())
             .then(|| now_us.wrapping_add(EEPROM_POLL_US));
         for other_us in [Some(pass_us), syn_us, save_us].into_iter().flatten() {
             due_us = first(now_us, due_us, other_us);

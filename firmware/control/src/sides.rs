@@ -17,9 +17,9 @@
 
 use lager_wire::LineState;
 
+use crate::Motor;
 use crate::board::Motors;
 use crate::time::reached;
-use crate::{Motor, PWM_STANDARD};
 
 /// Time from one correction in the mean to the next, in microseconds.
 const PERIOD_US: u32 = 20_000;
@@ -123,14 +123,14 @@ impl Sides {
         (self.bias + i16::from(round)) >> 8
     }
 
-    /// Adds the bias to duties that should move both sides alike.
+    /// Adds the bias to duties that should move both sides alike: the standard one or 0.
     pub fn alike(&self, motors: Motors, round: u8) -> Motors {
         let bias = self.bias(round);
         let with = |motor: Motor, bias: i16| Motor {
-            duty: if motor.duty == PWM_STANDARD {
-                (i16::from(PWM_STANDARD) + bias) as u8
+            duty: if motor.duty == 0 {
+                0
             } else {
-                motor.duty
+                (i16::from(motor.duty) + bias) as u8
             },
             ..motor
         };

@@ -1,7 +1,7 @@
 //! Keeps settings without power: two copies in EEPROM, each with a check value.
 //!
 //! ```text
-//!   address   0        1         2 .. 2+N    2+N          the second copy the same, from 32 on
+//!   address   0        1         2 .. 2+N    2+N          the second copy the same, 32 later
 //!             layout   counter   settings    CRC-8 over everything before it
 //!
 //!   save: layout = 255 --> counter, settings, CRC --> layout      into the older copy
@@ -10,7 +10,7 @@
 //! A copy is valid if its layout and its check value are right; of two valid ones the later counter
 //! wins. A save clears the layout byte first and writes it last, so that a save that is cut off
 //! leaves the other copy valid. The chip needs some milliseconds for a byte: every step hands over
-//! at most one, and nothing waits.
+//! at most one, and nothing waits. A board has two stores, each with a [`Place`] of its own.
 
 use lager_wire::checksum;
 
@@ -20,12 +20,24 @@ use crate::Board;
 const LAYOUT: u8 = 1;
 /// What an erased EEPROM holds.
 const ERASED: u8 = 0xFF;
-/// Where the second copy begins.
+/// Where the second copy begins, from a store's beginning.
 const SECOND: u8 = 32;
 /// The most bytes of settings, so that a copy with layout, counter and check value fits its half.
-const LONGEST: usize = 11;
+const LONGEST: usize = 12;
 /// A copy of the longest settings.
 const COPY: usize = LONGEST + 3;
+
+/// Where a store begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Place {
+    /// What the board has learnt or a person has set: thresholds or gains.
+    Settings = 0,
+    /// What the Pi has told of the robot.
+    Robot = 2 * SECOND,
+}
+
+const _: () = assert!(Place::Robot as u8 + 2 * SECOND == crate::EEPROM_LENGTH);
 
 /// A running save: the copy's bytes, and the index of the next one.
 #[derive(Debug, Clone)]
@@ -40,6 +52,7 @@ pub(crate) struct Store<const N: usize> {
     /// The settings in force in EEPROM, or in force when the save is done.
     kept: Option<[u8; N]>,
     counter: u8,
+    place: Place,
     /// The address that the next save writes to.
     slot: u8,
     save: Option<Save>,
@@ -47,10 +60,11 @@ pub(crate) struct Store<const N: usize> {
 
 impl<const N: usize> Store<N> {
     /// Opens the store. Also returns the settings that it found, if any are valid.
-    pub(crate) fn load(board: &impl Board) -> (Self, Option<[u8; N]>) {
+    pub(crate) fn load(board: &impl Board, place: Place) -> (Self, Option<[u8; N]>) {
         const { assert!(N <= LONGEST) };
-        let first = read(board, 0);
-        let second = read(board, SECOND);
+        let base = place as u8;
+        let first = read(board, base);
+        let second = read(board, base + SECOND);
         let second_wins = match (&first, &second) {
             (Some((first, _)), Some((second, _))) => second.wrapping_sub(*first) < 128,
             (None, Some(_)) => true,
@@ -61,10 +75,11 @@ impl<const N: usize> Store<N> {
         let store = Self {
             kept,
             counter: newest.map_or(0, |(counter, _)| counter),
+            place,
             slot: if second_wins || newest.is_none() {
-                0
+                base
             } else {
-                SECOND
+                base + SECOND
             },
             save: None,
         };
@@ -102,7 +117,7 @@ impl<const N: usize> Store<N> {
         }
         save.next += 1;
         if save.next > last {
-            self.slot = SECOND - self.slot;
+            self.slot = 2 * self.place as u8 + SECOND - self.slot;
             self.save = None;
         }
     }
@@ -127,7 +142,7 @@ fn read<const N: usize>(board: &impl Board, slot: u8) -> Option<(u8, [u8; N])> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lager_wire::ResetCause;
+    use lager_wire::{ResetCause, ResetOrder};
 
     /// An EEPROM that accepts every `slow`-th write.
     struct Chip {
@@ -164,6 +179,7 @@ mod tests {
         fn reset_cause(&self) -> ResetCause {
             ResetCause::Unknown
         }
+        fn reset(&mut self, _: ResetOrder) {}
         fn kick_watchdog(&mut self) {}
         fn eeprom_read(&self, address: u8) -> u8 {
             self.bytes[usize::from(address)]
@@ -180,12 +196,27 @@ mod tests {
     }
 
     fn loaded(chip: &Chip) -> Option<[u8; 3]> {
-        Store::load(chip).1
+        Store::load(chip, Place::Settings).1
     }
 
     fn finish(store: &mut Store<3>, chip: &mut Chip) {
         while store.is_saving() {
             store.poll(chip);
+        }
+    }
+
+    #[test]
+    fn two_stores_do_not_touch_each_other() {
+        let mut chip = Chip::erased();
+        for round in 0..4 {
+            for place in [Place::Settings, Place::Robot] {
+                let settings = [round, place as u8, 7];
+                let (mut store, before) = Store::load(&chip, place);
+                let kept = [round.wrapping_sub(1), place as u8, 7];
+                assert_eq!(before, (round > 0).then_some(kept));
+                store.save(settings);
+                finish(&mut store, &mut chip);
+            }
         }
     }
 
@@ -201,7 +232,7 @@ mod tests {
             chip.slow = slow;
             for round in 0..600_u16 {
                 let settings = [round as u8, (round >> 8) as u8, 255];
-                let (mut store, _) = Store::load(&chip);
+                let (mut store, _) = Store::load(&chip, Place::Settings);
                 store.save(settings);
                 finish(&mut store, &mut chip);
                 assert_eq!(loaded(&chip), Some(settings), "round {round}");
@@ -213,7 +244,7 @@ mod tests {
     fn a_save_cut_off_anywhere_leaves_the_one_before() {
         for cut in 0..=7 {
             let mut chip = Chip::erased();
-            let (mut store, _) = Store::load(&chip);
+            let (mut store, _) = Store::load(&chip, Place::Settings);
             for settings in [[1, 2, 3], [4, 5, 6], [7, 8, 9]] {
                 store.save(settings);
                 finish(&mut store, &mut chip);
@@ -230,7 +261,7 @@ mod tests {
     #[test]
     fn a_damaged_copy_gives_way_to_the_other() {
         let mut chip = Chip::erased();
-        let (mut store, _) = Store::load(&chip);
+        let (mut store, _) = Store::load(&chip, Place::Settings);
         for settings in [[1, 2, 3], [4, 5, 6]] {
             store.save(settings);
             finish(&mut store, &mut chip);
@@ -251,10 +282,10 @@ mod tests {
     #[test]
     fn the_same_settings_are_not_written_again() {
         let mut chip = Chip::erased();
-        let (mut store, _) = Store::load(&chip);
+        let (mut store, _) = Store::load(&chip, Place::Settings);
         store.save([1, 2, 3]);
         finish(&mut store, &mut chip);
-        let (mut store, _) = Store::load(&chip);
+        let (mut store, _) = Store::load(&chip, Place::Settings);
         store.save([1, 2, 3]);
         assert!(!store.is_saving());
         assert_eq!(chip.writes, 7);
@@ -263,7 +294,7 @@ mod tests {
     #[test]
     fn settings_changed_during_a_save_are_saved_in_its_place() {
         let mut chip = Chip::erased();
-        let (mut store, _) = Store::load(&chip);
+        let (mut store, _) = Store::load(&chip, Place::Settings);
         store.save([1, 2, 3]);
         finish(&mut store, &mut chip);
         store.save([4, 5, 6]);

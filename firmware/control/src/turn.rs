@@ -17,9 +17,6 @@ use lager_wire::LineBits;
 use crate::line::centre_on_tape;
 use crate::time::reached;
 
-/// A full turn at the standard duty takes twelve seconds (W4, `STANDARD_THREESIXTY`).
-pub const FULL_TURN_US: u32 = 12_000_000;
-
 /// A turn that began on tape may end on tape only after the centre was off it this long, in
 /// microseconds: longer than a stain, and two words of a board that sends one every 5 ms.
 const OFF_US: u32 = 4_500;
@@ -36,19 +33,20 @@ pub enum Rotation {
 /// Angle of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Angle {
-    /// 45 degrees, 1.5 s.
+    /// 45 degrees.
     Diagonal,
-    /// 90 degrees, 3 s.
+    /// 90 degrees.
     Perpendicular,
 }
 
 impl Angle {
-    /// The time after which the turn ends without tape.
+    /// The time after which the turn ends without tape, if a full turn takes `full_turn_us` (W4,
+    /// `STANDARD_THREESIXTY`).
     #[must_use]
-    pub const fn duration_us(self) -> u32 {
+    pub const fn duration_us(self, full_turn_us: u32) -> u32 {
         match self {
-            Self::Diagonal => FULL_TURN_US / 8,
-            Self::Perpendicular => FULL_TURN_US / 4,
+            Self::Diagonal => full_turn_us / 8,
+            Self::Perpendicular => full_turn_us / 4,
         }
     }
 }
@@ -75,13 +73,13 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// A turn that begins now.
+    /// A turn that begins now and is over after `duration_us` ([`Angle::duration_us`]).
     #[must_use]
-    pub fn new(rotation: Rotation, angle: Angle, now_us: u32) -> Self {
+    pub fn new(rotation: Rotation, duration_us: u32, now_us: u32) -> Self {
         Self {
             rotation,
-            ends_us: now_us.wrapping_add(angle.duration_us()),
-            more_us: angle.duration_us() / 8 * 3,
+            ends_us: now_us.wrapping_add(duration_us),
+            more_us: duration_us / 8 * 3,
             tape: Tape::Unknown,
         }
     }
@@ -136,7 +134,7 @@ mod tests {
     const ASIDE: LineBits = LineBits(0b110_0000_0000);
 
     fn words(words: &[LineBits]) -> bool {
-        let mut turn = Turn::new(Rotation::Left, Angle::Perpendicular, 0);
+        let mut turn = Turn::new(Rotation::Left, 3_000_000, 0);
         for (word, at_us) in words.iter().zip((0..).step_by(5_000)) {
             turn.on_word(*word, at_us);
         }
@@ -145,12 +143,13 @@ mod tests {
 
     #[test]
     fn a_turn_is_over_when_its_time_is() {
-        for (angle, duration) in [
-            (Angle::Diagonal, 1_500_000),
-            (Angle::Perpendicular, 3_000_000),
+        for (angle, full_turn, duration) in [
+            (Angle::Diagonal, 12_000_000, 1_500_000),
+            (Angle::Perpendicular, 12_000_000, 3_000_000),
+            (Angle::Perpendicular, 8_000_000, 2_000_000),
         ] {
             let start = u32::MAX - 1_000;
-            let turn = Turn::new(Rotation::Right, angle, start);
+            let turn = Turn::new(Rotation::Right, angle.duration_us(full_turn), start);
             assert!(!turn.is_over(start));
             assert!(!turn.is_over(start.wrapping_add(duration - 1)));
             assert!(turn.is_over(start.wrapping_add(duration)));
@@ -159,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_turn_that_sees_no_tape_takes_longer() {
-        let mut turn = Turn::new(Rotation::Left, Angle::Perpendicular, 0);
+        let mut turn = Turn::new(Rotation::Left, 3_000_000, 0);
         turn.on_word(ASIDE, 5_000);
         assert!(!turn.is_over(4_124_999));
         assert_eq!(turn.ends_us(), 4_125_000);
@@ -176,7 +175,7 @@ mod tests {
     #[test]
     fn how_often_words_come_does_not_matter() {
         for period_us in [450, 5_000, 12_000_u32] {
-            let mut turn = Turn::new(Rotation::Left, Angle::Perpendicular, 0);
+            let mut turn = Turn::new(Rotation::Left, 3_000_000, 0);
             turn.on_word(LINE, 0);
             // A stain: 4 ms without tape.
             turn.on_word(ASIDE, period_us);

@@ -13,13 +13,13 @@
 //! of it. [`crate::follow`] gives following up without words or tape; the robot then stands until the
 //! next command.
 
-use lager_wire::{LineBits, WheelCommand};
+use lager_wire::{LineBits, WheelCommand, WheelsProfile};
 
+use crate::Motor;
 use crate::board::Motors;
 use crate::follow::{Follow, Lost};
 use crate::pulses::Pulses;
 use crate::turn::{Angle, Rotation, Turn};
-use crate::{Motor, PWM_STANDARD};
 
 /// Both sides standing still.
 pub(crate) const STILL: Motors = (Motor::OFF, Motor::OFF);
@@ -54,12 +54,38 @@ enum Mode {
 #[derive(Debug, Clone)]
 pub(crate) struct Wheels {
     mode: Mode,
+    profile: WheelsProfile,
 }
 
 impl Wheels {
-    pub(crate) const fn new() -> Self {
+    pub(crate) const fn new(profile: WheelsProfile) -> Self {
         Self {
             mode: Mode::Standby,
+            profile,
+        }
+    }
+
+    /// What is in force.
+    pub(crate) fn profile(&self) -> &WheelsProfile {
+        &self.profile
+    }
+
+    /// Puts another description of the wheels in force; they stand from now on. The caller has
+    /// ended their command.
+    pub(crate) fn set_profile(&mut self, profile: WheelsProfile) {
+        self.mode = Mode::Standby;
+        self.profile = profile;
+    }
+
+    /// The orders to the two drivers for these motors.
+    pub(crate) fn at_drivers(&self, (mut left, mut right): Motors) -> Motors {
+        let profile = &self.profile;
+        left.reverse ^= profile.left_reversed;
+        right.reverse ^= profile.right_reversed;
+        if profile.swapped {
+            (right, left)
+        } else {
+            (left, right)
         }
     }
 
@@ -123,7 +149,9 @@ impl Wheels {
             Some(_) => None,
             None => {
                 if may_turn {
-                    *under_way = Some(Turn::new(*rotation, *angle, now_us));
+                    let full_turn_us = u32::from(self.profile.full_turn_ms) * 1_000;
+                    let duration_us = angle.duration_us(full_turn_us);
+                    *under_way = Some(Turn::new(*rotation, duration_us, now_us));
                 }
                 None
             }
@@ -161,8 +189,8 @@ impl Wheels {
     /// The motors in this mode. `correction` is the regulator's, or `None` without a line to
     /// follow.
     pub(crate) fn motors(&self, correction: Option<i16>) -> Motors {
-        let ahead = Motor::forward(PWM_STANDARD);
-        let back = Motor::backward(PWM_STANDARD);
+        let ahead = Motor::forward(self.profile.duty);
+        let back = Motor::backward(self.profile.duty);
         match &self.mode {
             Mode::Manual(command, _) => match command.at_full() {
                 WheelCommand::ManualForward => (ahead, ahead),
@@ -172,7 +200,7 @@ impl Wheels {
                 _ => STILL,
             },
             Mode::Follow { along, watch, .. } if watch.lost().is_none() => {
-                correction.map_or(STILL, |u| follow(*along, u))
+                correction.map_or(STILL, |u| follow(*along, self.profile.duty, u))
             }
             Mode::Turn {
                 under_way: Some(turn),
@@ -251,21 +279,22 @@ impl Wheels {
 /// has the other sign and is halved (AMB-21). That is unproven and cannot be stable: with trailing
 /// sensors any correction lets the axle drift off at about speed / sensor distance. So it is for
 /// short ways only.
-fn follow(along: Along, correction: i16) -> Motors {
+fn follow(along: Along, duty: u8, correction: i16) -> Motors {
+    let around = |correction| around(duty, correction);
     match along {
         Along::Forward => (
-            Motor::forward(around_standard(correction)),
-            Motor::forward(around_standard(-correction)),
+            Motor::forward(around(correction)),
+            Motor::forward(around(-correction)),
         ),
         Along::Backward => (
-            Motor::backward(around_standard(-correction / 2)),
-            Motor::backward(around_standard(correction / 2)),
+            Motor::backward(around(-correction / 2)),
+            Motor::backward(around(correction / 2)),
         ),
     }
 }
 
-fn around_standard(correction: i16) -> u8 {
-    (i16::from(PWM_STANDARD) + correction).clamp(0, 255) as u8
+fn around(duty: u8, correction: i16) -> u8 {
+    (i16::from(duty) + correction).clamp(0, 255) as u8
 }
 
 #[cfg(test)]
@@ -286,7 +315,7 @@ mod tests {
             (-7_650, 0, 255),
         ] {
             assert_eq!(
-                follow(Along::Forward, u),
+                follow(Along::Forward, 100, u),
                 (Motor::forward(left), Motor::forward(right)),
                 "u = {u}"
             );
@@ -297,7 +326,7 @@ mod tests {
     fn backwards_the_correction_is_halved_and_mirrored() {
         for (u, left, right) in [(0, 100, 100), (10, 95, 105), (-11, 105, 95), (400, 0, 255)] {
             assert_eq!(
-                follow(Along::Backward, u),
+                follow(Along::Backward, 100, u),
                 (Motor::backward(left), Motor::backward(right)),
                 "u = {u}"
             );
@@ -306,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_turn_waits_until_it_may_begin_and_then_has_its_whole_time() {
-        let mut wheels = Wheels::new();
+        let mut wheels = Wheels::new(WheelsProfile::default());
         wheels.start(WheelCommand::RightDiag, 5, 0);
         assert_eq!(wheels.advance(false, 0), None);
         assert_eq!(wheels.motors(None), STILL);
@@ -321,8 +350,55 @@ mod tests {
     }
 
     #[test]
+    fn every_way_to_connect_two_motors_drives_the_robot_alike() {
+        let wanted = (Motor::forward(90), Motor::backward(110));
+        for ways in 0..8_u8 {
+            let profile = WheelsProfile {
+                swapped: ways & 1 != 0,
+                left_reversed: ways & 2 != 0,
+                right_reversed: ways & 4 != 0,
+                ..WheelsProfile::default()
+            };
+            let drivers = Wheels::new(profile).at_drivers(wanted);
+            // What the wiring makes of the drivers' orders.
+            let (mut left, mut right) = if profile.swapped {
+                (drivers.1, drivers.0)
+            } else {
+                drivers
+            };
+            left.reverse ^= profile.left_reversed;
+            right.reverse ^= profile.right_reversed;
+            assert_eq!((left, right), wanted, "{profile:?}");
+        }
+    }
+
+    #[test]
+    fn duty_and_time_of_a_turn_are_those_of_the_robot() {
+        let mut wheels = Wheels::new(WheelsProfile {
+            duty: 140,
+            full_turn_ms: 8_000,
+            ..WheelsProfile::default()
+        });
+        wheels.start(WheelCommand::LeftPerp, 5, 0);
+        assert_eq!(wheels.advance(true, 0), None);
+        assert_eq!(
+            wheels.motors(None),
+            (Motor::backward(140), Motor::forward(140))
+        );
+        assert_eq!(wheels.advance(true, 1_999_999), None);
+        assert_eq!(wheels.advance(true, 2_000_000), Some(5));
+        wheels.start(WheelCommand::ActiveForward, 6, 0);
+        assert_eq!(
+            wheels.motors(Some(4)),
+            (Motor::forward(144), Motor::forward(136))
+        );
+        wheels.set_profile(WheelsProfile::default());
+        assert_eq!(wheels.motors(Some(4)), STILL);
+    }
+
+    #[test]
     fn without_a_line_following_stands_still() {
-        let mut wheels = Wheels::new();
+        let mut wheels = Wheels::new(WheelsProfile::default());
         wheels.start(WheelCommand::ActiveForward, 1, 0);
         assert_eq!(wheels.motors(None), STILL);
         assert_eq!(

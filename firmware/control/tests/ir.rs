@@ -4,8 +4,8 @@
 //! paper; the drawing is exact to about 0.02 V) and from the hand-read table gp2y0A41SK of J.
 //! Doggen's Arduino distance library.
 
-use lager_control::ir::IrModel;
-use lager_wire::Centimetres;
+use lager_control::ir::Curve;
+use lager_wire::{Centimetres, IrModel, RangerProfile};
 
 const GP2Y0A21: [(f64, f64); 10] = [
     (10.0, 2.305),
@@ -51,6 +51,14 @@ const GP2Y0A41: [(f64, f64); 7] = [
 
 const MODELS: [IrModel; 3] = [IrModel::Gp2y0a21, IrModel::Gp2y0a41, IrModel::Gp2y0a02];
 
+/// The curve of a ranger of this model.
+fn curve(model: IrModel) -> Curve {
+    Curve::new(&RangerProfile {
+        model,
+        ..RangerProfile::default()
+    })
+}
+
 /// What a 10-bit ADC with a 5 V reference reads at a voltage.
 fn adc(volt: f64) -> u16 {
     (volt * 1024.0 / 5.0) as u16
@@ -65,7 +73,7 @@ fn near(measured: Centimetres, cm: f64) -> bool {
 #[test]
 fn the_gp2y0a21_agrees_with_the_data_sheet() {
     for (cm, volt) in GP2Y0A21 {
-        let measured = IrModel::Gp2y0a21.distance(adc(volt));
+        let measured = curve(IrModel::Gp2y0a21).distance(adc(volt));
         assert!(near(measured, cm), "{cm} cm, {volt} V: {measured}");
     }
 }
@@ -73,19 +81,19 @@ fn the_gp2y0a21_agrees_with_the_data_sheet() {
 #[test]
 fn the_gp2y0a41_agrees_with_the_hand_read_curve() {
     for (cm, volt) in GP2Y0A41 {
-        let measured = IrModel::Gp2y0a41.distance(adc(volt));
+        let measured = curve(IrModel::Gp2y0a41).distance(adc(volt));
         assert!(near(measured, cm), "{cm} cm, {volt} V: {measured}");
     }
 }
 
 #[test]
 fn the_gp2y0a02_agrees_with_the_data_sheets_typical_voltages() {
-    assert!(near(IrModel::Gp2y0a02.distance(adc(2.45)), 20.0));
-    assert!(near(IrModel::Gp2y0a02.distance(adc(0.4)), 150.0));
+    assert!(near(curve(IrModel::Gp2y0a02).distance(adc(2.45)), 20.0));
+    assert!(near(curve(IrModel::Gp2y0a02).distance(adc(0.4)), 150.0));
     // Phidgets gives 9.462 / (ratio - 0.01692) for the same sensor (product 3522).
     for volt in [0.5, 0.7, 1.0, 1.5, 2.0] {
         let cm = 9.462 / (volt / 5.0 - 0.016_92);
-        let measured = IrModel::Gp2y0a02.distance(adc(volt));
+        let measured = curve(IrModel::Gp2y0a02).distance(adc(volt));
         assert!(near(measured, cm), "{volt} V: {measured}, not {cm}");
     }
 }
@@ -94,15 +102,16 @@ fn the_gp2y0a02_agrees_with_the_data_sheets_typical_voltages() {
 fn between_the_points_the_curve_is_that_of_a_triangulating_sensor() {
     // Halfway in voltage between 10 and 15 cm lies their harmonic mean, 12 cm, and not 12.5 cm.
     let halfway = u16::midpoint(adc(2.305), adc(1.645));
-    assert_eq!(IrModel::Gp2y0a21.distance(halfway), Centimetres(12));
+    assert_eq!(curve(IrModel::Gp2y0a21).distance(halfway), Centimetres(12));
 }
 
 #[test]
 fn a_higher_voltage_is_never_farther() {
     for model in MODELS {
+        let curve = curve(model);
         let mut last = u8::MAX;
         for adc in 0..=1023 {
-            let distance = model.distance(adc).0;
+            let distance = curve.distance(adc).0;
             assert!(distance <= last, "{model:?} at {adc}");
             last = distance;
         }
@@ -112,9 +121,10 @@ fn a_higher_voltage_is_never_farther() {
 #[test]
 fn every_reading_is_within_the_models_range_or_no_distance() {
     for model in MODELS {
+        let curve = curve(model);
         let (mut least, mut most) = (u8::MAX, 0);
         for adc in 0..=u16::MAX {
-            let Some(cm) = model.distance(adc).get() else {
+            let Some(cm) = curve.distance(adc).get() else {
                 continue;
             };
             least = least.min(cm);
@@ -122,7 +132,7 @@ fn every_reading_is_within_the_models_range_or_no_distance() {
         }
         assert_eq!(
             (least, most),
-            (model.least_cm(), model.most_cm()),
+            (curve.least_cm(), curve.most_cm()),
             "{model:?}"
         );
     }
@@ -131,7 +141,7 @@ fn every_reading_is_within_the_models_range_or_no_distance() {
 #[test]
 fn what_is_nearer_than_the_least_never_reads_below_it() {
     for (cm, volt) in GP2Y0A21_FOLDED {
-        let measured = IrModel::Gp2y0a21.distance(adc(volt));
+        let measured = curve(IrModel::Gp2y0a21).distance(adc(volt));
         assert!(measured.0 >= 10, "{cm} cm: {measured}");
         if volt > 2.305 {
             assert_eq!(measured, Centimetres(10), "{cm} cm is near the peak");
@@ -142,9 +152,32 @@ fn what_is_nearer_than_the_least_never_reads_below_it() {
 #[test]
 fn nothing_in_range_is_no_distance() {
     for model in MODELS {
-        assert_eq!(model.distance(0), Centimetres::NONE);
-        assert_eq!(model.distance(70), Centimetres::NONE);
-        assert_eq!(model.distance(1023), Centimetres(model.least_cm()));
+        let curve = curve(model);
+        assert_eq!(curve.distance(0), Centimetres::NONE);
+        assert_eq!(curve.distance(70), Centimetres::NONE);
+        assert_eq!(curve.distance(1023), Centimetres(curve.least_cm()));
     }
-    assert_eq!(IrModel::default(), IrModel::Gp2y0a21);
+    assert_eq!(RangerProfile::default().model, IrModel::Gp2y0a21);
+}
+
+#[test]
+fn an_own_curve_goes_through_its_two_points_and_keeps_their_range() {
+    let curve = Curve::new(&RangerProfile {
+        model: IrModel::Own,
+        near_cm: 15,
+        near_reading: 400,
+        far_cm: 60,
+        far_reading: 100,
+    });
+    for (reading, expected) in [
+        (1_023, Centimetres(15)),
+        (400, Centimetres(15)),
+        // A third of the way from far to near in the inverse of the distance.
+        (200, Centimetres(30)),
+        (100, Centimetres(60)),
+        (99, Centimetres::NONE),
+        (0, Centimetres::NONE),
+    ] {
+        assert_eq!(curve.distance(reading), expected, "{reading}");
+    }
 }

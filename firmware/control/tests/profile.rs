@@ -4,7 +4,8 @@ mod support;
 
 use lager_control::SteeringConfig;
 use lager_wire::{
-    ArmLimits, ArmPose, ArmProfile, Payload, Setting, SettingKey, SettingReply, SettingStatus,
+    ArmLimits, ArmPose, ArmProfile, Payload, Profile, Setting, SettingKey, SettingReply,
+    SettingStatus,
 };
 use support::Bench;
 use support::arm::{done, refused};

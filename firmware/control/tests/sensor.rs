@@ -2,10 +2,10 @@
 
 mod support;
 
-use lager_control::SensorConfig;
+use lager_control::{EEPROM_LENGTH, SensorConfig};
 use lager_wire::{
-    Callsign, Centimetres, LineBits, LineReading, LineState, Payload, ResetCause, SettingKey,
-    SettingReply, SettingStatus, SteerCommand,
+    Callsign, Centimetres, LineBits, LineReading, LineState, Payload, ResetCause, ResetOrder,
+    SettingKey, SettingReply, SettingStatus, SteerCommand,
 };
 use support::SensorBench;
 
@@ -412,7 +412,10 @@ fn a_calibration_outlives_the_power_and_an_empty_one_is_not_kept() {
     let mut bench = SensorBench::ready(SensorConfig::default());
     bench.set(SettingKey::Calibrate, 1, 1);
     bench.run_ms(5_100);
-    assert_eq!(bench.pins.eeprom, [255; 64], "nothing was seen");
+    assert_eq!(
+        bench.pins.eeprom, [255; EEPROM_LENGTH as usize],
+        "nothing was seen"
+    );
     bench.set(SettingKey::Calibrate, 2, 1);
     for reading in [30, 110] {
         bench.pins.line = [reading; 11];
@@ -451,4 +454,14 @@ fn the_watchdog_is_kicked_well_inside_its_time() {
     }
     assert!(longest <= 20_000, "{longest}");
     assert_eq!(bench.pins.kicks, 2_000);
+}
+
+#[test]
+fn it_resets_when_the_pi_orders_it() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.run_ms(10);
+    assert_eq!(bench.pins.resets, []);
+    bench.send(Payload::Reset(ResetOrder::Restart));
+    bench.run_ms(1);
+    assert_eq!(bench.pins.resets, [ResetOrder::Restart]);
 }

@@ -3,7 +3,7 @@
 mod support;
 
 use lager_control::{Motor, SteeringConfig};
-use lager_wire::{Command, Payload, SteerCommand, SteerFlags};
+use lager_wire::{Command, Payload, ResetOrder, SteerCommand, SteerFlags};
 use support::Bench;
 use support::servos::Servos;
 
@@ -545,4 +545,17 @@ fn what_takes_long_waits_while_a_word_comes_in_and_commands_do_not() {
     bench.pins.receiving = false;
     bench.run_ms(20);
     assert!(bench.reports().len() >= 4);
+}
+
+#[test]
+fn a_reset_that_the_pi_orders_switches_the_motors_off_first() {
+    for order in ResetOrder::ALL {
+        let mut bench = Bench::ready();
+        bench.command(FORWARD);
+        bench.run_ms(50);
+        assert_ne!(bench.pins.motors, OFF);
+        bench.send(Payload::Reset(*order));
+        bench.run_ms(1);
+        assert_eq!(bench.pins.resets, [(*order, Some(OFF))]);
+    }
 }

@@ -2,14 +2,14 @@
 
 use core::num::NonZeroI32;
 use std::io::{self, BufRead};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{Receiver, channel};
 
 use clap::Parser;
-use lager_emulator::chip::Image;
+use lager_emulator::chip::{Image, ImageError};
 use lager_emulator::measure::measure;
 use lager_emulator::rig::{Images, RigOptions};
 use lager_emulator::shell::{EmulatorConfig, run};
@@ -37,6 +37,12 @@ struct Cli {
     /// The steering board's image, an ELF file
     #[arg(long, value_name = "FILE")]
     steering_elf: PathBuf,
+    /// The sensor board's bootloader, an ELF file; with it the board can get another image
+    #[arg(long, value_name = "FILE")]
+    sensor_loader: Option<PathBuf>,
+    /// The steering board's bootloader, an ELF file
+    #[arg(long, value_name = "FILE")]
+    steering_loader: Option<PathBuf>,
     /// Path at which the sensor board's serial port appears
     #[arg(long, value_name = "PATH", required_unless_present = "trace")]
     sensor_link: Option<PathBuf>,
@@ -96,8 +102,8 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
     }
     let warehouse = warehouse(&cli.warehouse)?;
     let images = Images {
-        sensor: Image::read(&cli.sensor_elf)?,
-        steering: Image::read(&cli.steering_elf)?,
+        sensor: image(&cli.sensor_elf, cli.sensor_loader.as_deref())?,
+        steering: image(&cli.steering_elf, cli.steering_loader.as_deref())?,
     };
     let rig = RigOptions {
         warehouse,
@@ -150,6 +156,15 @@ fn end_with(parent: i32) -> Result<(), Box<dyn std::error::Error>> {
         return Err(format!("the parent (process {parent}) is gone").into());
     }
     Ok(())
+}
+
+/// A board's image, with its bootloader if it has one.
+fn image(application: &Path, loader: Option<&Path>) -> Result<Image, ImageError> {
+    let application = Image::read(application)?;
+    match loader {
+        Some(loader) => Ok(Image::read(loader)?.with(&application)),
+        None => Ok(application),
+    }
 }
 
 fn warehouse(text: &str) -> Result<Warehouse, String> {

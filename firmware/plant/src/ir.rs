@@ -1,4 +1,4 @@
-//! The IR ranger at the front, a Sharp GP2Y0A21 (AMB-14): turns distances into ADC values.
+//! The IR ranger at the front, a Sharp GP2Y0A21 unless the robot is built otherwise (AMB-14): turns distances into ADC values.
 //!
 //! It measures about every 38 ms and holds its output in between. Below 10 cm the voltage falls
 //! again although the object comes nearer. Rangers differ within the datasheet's limits: in the
@@ -13,6 +13,7 @@
 //! ```
 
 use crate::body::{IR_AHEAD, Pose};
+use crate::build::Ranger;
 use crate::make::Make;
 use crate::noise::Noise;
 use crate::scene::Block;
@@ -50,6 +51,19 @@ const NEAR_FIELD: [(f64, f64); 9] = [
     (5.85, 3.137),
     (10.0, 2.305),
 ];
+/// A GP2Y0A41SK0F, read by hand from its datasheet's curve, as (cm, volt).
+const GP2Y0A41: [(f64, f64); 8] = [
+    (4.0, 2.95),
+    (5.0, 2.45),
+    (6.667, 1.9),
+    (10.0, 1.3),
+    (20.0, 0.65),
+    (25.0, 0.5),
+    (29.0, 0.445),
+    (33.333, 0.395),
+];
+/// A GP2Y0A02YK: its datasheet's two typical voltages.
+const GP2Y0A02: [(f64, f64); 2] = [(20.0, 2.45), (150.0, 0.4)];
 /// Output without any object, in volts.
 const NOTHING: f64 = 0.15;
 /// Range of the beam, in mm.
@@ -63,6 +77,7 @@ const GAIN_ERROR: f64 = 0.02;
 /// The ranger, which holds its last output.
 #[derive(Clone, Debug)]
 pub struct IrRanger {
+    model: Ranger,
     gain: f64,
     /// Added after the gain, in volts.
     offset: f64,
@@ -85,6 +100,7 @@ impl IrRanger {
             Make::Varied => span / typical,
         };
         Self {
+            model: Ranger::default(),
             gain,
             offset: match make {
                 Make::Nominal => 0.0,
@@ -97,6 +113,11 @@ impl IrRanger {
         }
     }
 
+    /// Puts a ranger of another model in its place.
+    pub fn set_model(&mut self, model: Ranger) {
+        self.model = model;
+    }
+
     /// Makes a measurement if one is due.
     pub fn step(&mut self, now_ns: u64, pose: &Pose, blocks: &[Block]) {
         if now_ns < self.next_ns {
@@ -104,10 +125,19 @@ impl IrRanger {
         }
         self.next_ns = now_ns + self.cycle_ns;
         let clean = match distance(pose, blocks) {
-            Some(millimetres) => volts(millimetres / 10.0) * self.gain + self.offset,
+            Some(millimetres) => self.clean(millimetres / 10.0),
             None => NOTHING,
         };
         self.volts = clean + self.noise.bell(NOISE);
+    }
+
+    /// The output in volts for an object at `cm`, without noise.
+    fn clean(&self, cm: f64) -> f64 {
+        match self.model {
+            Ranger::Gp2y0a21 => volts(cm) * self.gain + self.offset,
+            Ranger::Gp2y0a41 => along(&GP2Y0A41, cm),
+            Ranger::Gp2y0a02 => along(&GP2Y0A02, cm),
+        }
     }
 
     /// The output as read by a 10-bit ADC at 5 V.
@@ -140,6 +170,19 @@ pub fn volts(cm: f64) -> f64 {
         between(&FAR_FIELD, cm, |cm| 1.0 / cm)
     } else {
         (last.1 * last.0 / cm).max(NOTHING)
+    }
+}
+
+/// The output of a model of which only these points are known: nearer objects read lower again, and
+/// farther ones ever less.
+fn along(table: &[(f64, f64)], cm: f64) -> f64 {
+    let (first, last) = (table[0], table[table.len() - 1]);
+    if cm < first.0 {
+        first.1 * cm / first.0
+    } else if cm < last.0 {
+        between(table, cm, |cm| 1.0 / cm)
+    } else {
+        last.1 * last.0 / cm
     }
 }
 

@@ -20,6 +20,7 @@
 pub mod arm;
 pub mod battery;
 pub mod body;
+mod build;
 mod builtin;
 mod by_hand;
 pub mod contact;
@@ -41,6 +42,7 @@ pub mod weave;
 mod world;
 
 pub use body::Pose;
+pub use build::{Build, Ranger};
 pub use by_hand::{Hand, Report};
 pub use goods::{Good, GoodState};
 pub use make::Make;

@@ -46,6 +46,7 @@ const WANDER: f64 = 0.008;
 #[derive(Clone, Debug)]
 pub struct Motor {
     gain: f64,
+    gear: f64,
     dead_band: f64,
     duty: f64,
     wander: f64,
@@ -64,6 +65,7 @@ impl Motor {
         let gain = 1.0 + noise.spread(error);
         Self {
             gain,
+            gear: 1.0,
             dead_band: make.draw(&mut noise, DEAD_BAND, DEAD_BANDS[0], DEAD_BANDS[1]),
             duty: 0.0,
             wander: 0.0,
@@ -71,6 +73,11 @@ impl Motor {
             speed: 0.0,
             noise,
         }
+    }
+
+    /// Sets how fast the wheels are beside those of the robot as drawn.
+    pub fn set_gear(&mut self, gear: f64) {
+        self.gear = gear;
     }
 
     /// Sets the duty, -255..=255; negative turns the wheels backwards.
@@ -83,7 +90,7 @@ impl Motor {
     pub fn set_supply(&mut self, volts: f64) {
         let duty = self.duty.abs() * volts / battery::NOMINAL;
         let effective = (duty - self.dead_band).max(0.0) / (STANDARD_DUTY - self.dead_band);
-        self.target = (effective * CRUISE * self.gain).copysign(self.duty);
+        self.target = (effective * CRUISE * self.gain * self.gear).copysign(self.duty);
     }
 
     /// Advances by `seconds`, which must be much shorter than the lag.

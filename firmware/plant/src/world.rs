@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::arm::{self, SERVOS};
 use crate::battery::Battery;
 use crate::body::Pose;
+use crate::build::Build;
 use crate::contact::Contact;
 use crate::goods::{Good, Goods};
 use crate::ir::IrRanger;
@@ -43,6 +44,7 @@ mod stream {
     pub(super) const BATTERY: u64 = 6;
     pub(super) const GRIP: u64 = 7;
     pub(super) const SERVOS: u64 = 8;
+    pub(super) const INPUT: u64 = 9;
 }
 
 /// The part of a world that is kept, to go on with it elsewhere.
@@ -71,7 +73,7 @@ pub struct WorldState {
 pub struct Snapshot {
     /// The kept part of the world.
     pub world: WorldState,
-    /// Duties at the left and the right motor driver, negative backwards.
+    /// Duties at the left and the right motor, negative backwards.
     pub duties: [i16; 2],
     /// The product in the claw.
     pub carrying: Option<i32>,
@@ -80,6 +82,9 @@ pub struct Snapshot {
 /// A warehouse with a robot in it.
 #[derive(Clone, Debug)]
 pub struct World {
+    build: Build,
+    /// What an input shows that hangs at nothing.
+    floating: Noise,
     tape: Tape,
     blocks: Vec<Block>,
     obstacles: Obstacles,
@@ -133,6 +138,8 @@ impl World {
         let servos = ServoBus::sagging(servo_positions, noise(stream::SERVOS), make);
         let positions = servos.positions();
         Ok(Self {
+            build: Build::default(),
+            floating: noise(stream::INPUT),
             tape,
             blocks,
             obstacles: Obstacles::new(warehouse),
@@ -152,6 +159,16 @@ impl World {
         })
     }
 
+    /// The same world with a robot that is built otherwise.
+    #[must_use]
+    pub fn built(mut self, build: Build) -> Self {
+        self.build = build;
+        self.left.set_gear(build.gear);
+        self.right.set_gear(build.gear);
+        self.ir.set_model(build.ranger);
+        self
+    }
+
     /// Time since the start of the world, a whole number of steps.
     pub fn now(&self) -> Duration {
         Duration::from_nanos(self.now_ns)
@@ -166,17 +183,27 @@ impl World {
         }
     }
 
-    /// Sets the duties of the left and the right motor, -255..=255, negative backwards.
+    /// Sets the duties at the left and the right driver, -255..=255, negative backwards.
     pub fn set_motors(&mut self, left: i16, right: i16) {
-        self.duties = [left, right];
-        self.left.set_duty(left);
-        self.right.set_duty(right);
+        self.duties = self.build.motors([left, right]);
+        self.left.set_duty(self.duties[0]);
+        self.right.set_duty(self.duties[1]);
         self.feed(0.0);
     }
 
     /// The battery's voltage now.
     pub fn battery_volts(&self) -> f64 {
         self.battery.volts()
+    }
+
+    /// The voltage at the steering board's input for the battery: a quarter of the battery's, or
+    /// anything without a divider.
+    pub fn battery_input_volts(&mut self) -> f64 {
+        if self.build.divider {
+            self.battery.volts() / 4.0
+        } else {
+            2.5 + self.floating.spread(2.5)
+        }
     }
 
     /// Sets the battery's charge, 0 to 1; for a robot as drawn the voltage does not change.
@@ -234,9 +261,15 @@ impl World {
         self.duties
     }
 
-    /// One conversion of a line sensor, 0 = leftmost: 8 bits, high over tape.
+    /// One conversion of a line sensor, 0 = leftmost: 8 bits, high over tape unless the robot is
+    /// built otherwise.
     pub fn read_line(&mut self, channel: u8) -> u8 {
-        self.line.read(channel, &self.pose, &self.tape)
+        let reading = self.line.read(channel, &self.pose, &self.tape);
+        if self.build.dark_is_low {
+            !reading
+        } else {
+            reading
+        }
     }
 
     /// One conversion of the IR ranger: 10 bits at 5 V.

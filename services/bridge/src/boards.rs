@@ -68,6 +68,7 @@ impl Boards {
                 Version::One => 1,
             },
             reset_cause: board.up.reset.into(),
+            build: board.up.build,
             port: u8::try_from(place).unwrap_or(BoardHealth::UNKNOWN),
             ..BoardHealth::default()
         };

@@ -2,17 +2,24 @@
 //! closed contact pulls to ground.
 //!
 //! ```text
-//!   reset    open -> closed    the robot has been put on the delivery node
-//!   switch   open              manual mode
-//!            closed            autonomous mode
+//!   reset                  open -> closed    the robot has been put on the delivery node
+//!   switch, of a position  open              manual mode
+//!                          closed            autonomous mode
+//!   switch, of a press     open -> closed    the other mode
 //! ```
-//! - The switch's position is a mode; the switch does not toggle. Its first position sets the mode
-//!   of a robot that has just been started. A bridge that goes on from an earlier state keeps that
-//!   mode until somebody moves the switch. Others may change the mode meanwhile, and the next
-//!   movement of the switch counts again.
+//! - A switch that stays where it is moved sets the mode. Its first position sets the mode of a
+//!   robot that has just been started. A bridge that goes on from an earlier state keeps that mode
+//!   until somebody moves the switch. Others may change the mode meanwhile, and the next movement
+//!   of the switch counts again.
+//! - A button that springs back toggles the mode. Only a movement from open to closed is a press,
+//!   so a button that is held at the start changes nothing, and neither does letting it go.
+//! - A press within [`BETWEEN_PRESSES`] of the last one is a worn contact that bounces, and does
+//!   not count. Otherwise it would take back what the person has done.
 //! - A press that is read a second late does not count: the person has given it up.
 //! - The kernel debounces the lines, and gives each change its time by `CLOCK_MONOTONIC`.
 //! - If a chip cannot be opened, the bridge goes on, logs it, and tries again for ever.
+//!
+//! What a press of reset does to a stop, `machine/start.rs` decides.
 //!
 //! Below this stands [`Lines`]: on a machine without a chip, a test can move contacts there.
 
@@ -26,11 +33,14 @@ use gpiocdev::line::{Bias, EdgeDetection, EdgeKind, Value};
 use lager_home::Clock;
 use lager_orders::Mode;
 use lager_orders::lease::LATEST_MOVE_NS;
+use serde::{Deserialize, Serialize};
 
 /// How often the thread checks whether the bridge ends.
 const LOOK: Duration = Duration::from_millis(100);
 /// After how many checks it tries again to open a chip.
 const LOOKS: u32 = 20;
+/// Nobody presses one button twice within this time, in ns.
+pub const BETWEEN_PRESSES: u64 = 250_000_000;
 
 /// Which lines they are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,8 +51,23 @@ pub struct ButtonsConfig {
     pub reset: Option<u32>,
     /// The offset of the mode switch's line.
     pub switch: Option<u32>,
+    /// What that switch is.
+    pub switch_kind: SwitchKind,
+    /// Whether a press of reset at the delivery node ends the stop of a fresh start.
+    pub reset_starts: bool,
     /// How long a contact must be steady.
     pub debounce: Duration,
+}
+
+/// What a mode switch tells by its contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SwitchKind {
+    /// A switch that stays where it is moved: its position is the mode.
+    #[default]
+    Position,
+    /// A button that springs back: each press toggles the mode.
+    Press,
 }
 
 /// Something that a person has done.
@@ -52,6 +77,17 @@ pub enum Touch {
     Reset,
     /// Moved the switch to a mode.
     Switched(Mode),
+    /// Pressed the mode button.
+    Toggled,
+}
+
+impl Touch {
+    /// Whether nobody waits any more for the effect of what was done at `at_ns`. A switch that
+    /// stays where it was moved is never too late.
+    pub fn is_late(self, at_ns: u64, now_ns: u64) -> bool {
+        let is_press = !matches!(self, Self::Switched(_));
+        is_press && at_ns.abs_diff(now_ns) > LATEST_MOVE_NS
+    }
 }
 
 /// The contacts at their lines, debounced.
@@ -90,6 +126,8 @@ struct Contacts {
     switch: Option<bool>,
     /// The first position sets the mode.
     is_first: bool,
+    reset: Press,
+    mode: Press,
 }
 
 impl Contacts {
@@ -97,6 +135,8 @@ impl Contacts {
         Self {
             switch: None,
             is_first: !resume,
+            reset: Press::NEW,
+            mode: Press::NEW,
         }
     }
 
@@ -114,20 +154,69 @@ impl Contacts {
         counts.then_some(Touch::Switched(mode))
     }
 
-    /// The reset button has moved. A press that is too old does not count.
-    fn reset(is_closed: bool, moved_ns: u64, now_ns: u64) -> Option<Touch> {
-        let is_fresh = moved_ns.abs_diff(now_ns) <= LATEST_MOVE_NS;
-        (is_closed && is_fresh).then_some(Touch::Reset)
+    /// The lines are open for reading, and `is_closed` says which contacts are closed now.
+    fn begin(
+        &mut self,
+        config: &ButtonsConfig,
+        is_closed: impl Fn(u32) -> io::Result<bool>,
+    ) -> io::Result<Option<Touch>> {
+        if let Some(line) = config.reset {
+            self.reset.is_closed = is_closed(line)?;
+        }
+        let Some(line) = config.switch else {
+            return Ok(None);
+        };
+        Ok(match config.switch_kind {
+            SwitchKind::Position => self.switch(is_closed(line)?),
+            SwitchKind::Press => {
+                self.mode.is_closed = is_closed(line)?;
+                None
+            }
+        })
+    }
+
+    /// A contact has moved.
+    fn take(&mut self, config: &ButtonsConfig, moved: Movement) -> Option<Touch> {
+        match (Some(moved.line) == config.switch, config.switch_kind) {
+            (true, SwitchKind::Position) => self.switch(moved.is_closed),
+            (true, SwitchKind::Press) => self.mode.moves(moved).then_some(Touch::Toggled),
+            (false, _) => self.reset.moves(moved).then_some(Touch::Reset),
+        }
     }
 }
 
-/// Passes on what people do, until `end`.
+/// A button that springs back.
+#[derive(Clone, Copy, Debug)]
+struct Press {
+    is_closed: bool,
+    /// When it was last pressed, in ns.
+    last_ns: Option<u64>,
+}
+
+impl Press {
+    const NEW: Self = Self {
+        is_closed: false,
+        last_ns: None,
+    };
+
+    /// The contact has moved. Returns whether that is a press.
+    fn moves(&mut self, moved: Movement) -> bool {
+        let was_closed = core::mem::replace(&mut self.is_closed, moved.is_closed);
+        if was_closed || !moved.is_closed {
+            return false;
+        }
+        let before = self.last_ns.replace(moved.at_ns);
+        before.is_none_or(|before| moved.at_ns.abs_diff(before) > BETWEEN_PRESSES)
+    }
+}
+
+/// Passes on what people do, and when they did it (in ns of `CLOCK_MONOTONIC`), until `end`.
 pub fn watch(
     config: &ButtonsConfig,
     open: &Opener,
     resume: bool,
     end: &AtomicBool,
-    mut touched: impl FnMut(Touch),
+    mut touched: impl FnMut(Touch, u64),
 ) {
     let mut contacts = Contacts::new(resume);
     let mut complaints = 0_u32;
@@ -199,21 +288,18 @@ fn watch_lines(
     lines: &dyn Lines,
     contacts: &mut Contacts,
     end: &AtomicBool,
-    touched: &mut impl FnMut(Touch),
+    touched: &mut impl FnMut(Touch, u64),
 ) -> io::Result<()> {
-    if let Some(line) = config.switch {
-        let touch = contacts.switch(lines.is_closed(line)?);
-        touch.into_iter().for_each(&mut *touched);
+    if let Some(touch) = contacts.begin(config, |line| lines.is_closed(line))? {
+        touched(touch, Clock::monotonic_ns());
     }
     while !end.load(Ordering::Acquire) {
         let Some(moved) = lines.movement(LOOK)? else {
             continue;
         };
-        let touch = match Some(moved.line) == config.switch {
-            true => contacts.switch(moved.is_closed),
-            false => Contacts::reset(moved.is_closed, moved.at_ns, Clock::monotonic_ns()),
-        };
-        touch.into_iter().for_each(&mut *touched);
+        if let Some(touch) = contacts.take(config, moved) {
+            touched(touch, moved.at_ns);
+        }
     }
     Ok(())
 }
@@ -245,25 +331,90 @@ mod tests {
         assert_eq!(contacts.switch(false), Some(Touch::Switched(Mode::Manual)));
     }
 
+    const RESET: u32 = 0;
+    const SWITCH: u32 = 1;
+
+    fn config(switch_kind: SwitchKind) -> ButtonsConfig {
+        ButtonsConfig {
+            chip: "/dev/null".into(),
+            reset: Some(RESET),
+            switch: Some(SWITCH),
+            switch_kind,
+            reset_starts: true,
+            debounce: Duration::from_millis(20),
+        }
+    }
+
+    /// What comes of a contact that moves `at_ms`.
+    fn moves(contacts: &mut Contacts, line: u32, is_closed: bool, at_ms: u64) -> Option<Touch> {
+        let at_ns = at_ms * 1_000_000;
+        let moved = Movement {
+            line,
+            is_closed,
+            at_ns,
+        };
+        contacts.take(&config(SwitchKind::Press), moved)
+    }
+
     #[test]
-    fn a_press_counts_when_it_is_made_and_not_when_it_ends_or_is_old() {
+    fn a_press_counts_when_it_is_made_and_not_when_it_ends() {
+        for (line, touch) in [(RESET, Touch::Reset), (SWITCH, Touch::Toggled)] {
+            let mut contacts = Contacts::new(false);
+            for at_ms in [5_000, 6_000] {
+                assert_eq!(moves(&mut contacts, line, true, at_ms), Some(touch));
+                assert_eq!(moves(&mut contacts, line, false, at_ms + 100), None);
+            }
+        }
+    }
+
+    #[test]
+    fn a_button_that_is_held_at_the_start_changes_nothing_until_it_is_pressed_anew() {
+        for resume in [false, true] {
+            let mut contacts = Contacts::new(resume);
+            let begun = contacts.begin(&config(SwitchKind::Press), |_| Ok(true));
+            assert_eq!(begun.unwrap(), None);
+            for (line, touch) in [(RESET, Touch::Reset), (SWITCH, Touch::Toggled)] {
+                // The kernel may tell of the contact as it finds it.
+                assert_eq!(moves(&mut contacts, line, true, 1_000), None);
+                assert_eq!(moves(&mut contacts, line, false, 2_000), None);
+                assert_eq!(moves(&mut contacts, line, true, 3_000), Some(touch));
+            }
+        }
+    }
+
+    #[test]
+    fn a_contact_that_bounces_is_one_press() {
+        for (line, touch) in [(RESET, Touch::Reset), (SWITCH, Touch::Toggled)] {
+            let mut contacts = Contacts::new(false);
+            assert_eq!(moves(&mut contacts, line, true, 1_000), Some(touch));
+            for bounce in [40, 90, 200] {
+                assert_eq!(moves(&mut contacts, line, false, 1_000 + bounce), None);
+                assert_eq!(moves(&mut contacts, line, true, 1_020 + bounce), None);
+            }
+            // It bounces for as long as it is held, and then it is let go.
+            assert_eq!(moves(&mut contacts, line, false, 1_500), None);
+            assert_eq!(moves(&mut contacts, line, true, 1_800), Some(touch));
+        }
+    }
+
+    #[test]
+    fn what_is_old_does_not_count_except_where_a_switch_stands() {
         let now = 5_000_000_000;
-        assert_eq!(Contacts::reset(true, now, now), Some(Touch::Reset));
-        assert_eq!(Contacts::reset(false, now, now), None);
-        assert_eq!(Contacts::reset(true, now - LATEST_MOVE_NS - 1, now), None);
+        let old = now - LATEST_MOVE_NS - 1;
+        for touch in [Touch::Reset, Touch::Toggled] {
+            assert!(touch.is_late(old, now) && !touch.is_late(old + 1, now));
+            // A time of another clock.
+            assert!(touch.is_late(now + LATEST_MOVE_NS + 1, now));
+        }
+        assert!(!Touch::Switched(Mode::Autonomous).is_late(0, now));
     }
 
     #[test]
     fn a_chip_that_is_not_there_ends_nothing_and_the_wish_to_end_is_heard() {
-        let config = ButtonsConfig {
-            chip: "/dev/null".into(),
-            reset: Some(0),
-            switch: Some(1),
-            debounce: Duration::from_millis(20),
-        };
+        let config = config(SwitchKind::Position);
         assert!(open(&config).is_err());
         let end = AtomicBool::new(false);
-        let nobody = |touch| panic!("{touch:?}");
+        let nobody = |touch, _| panic!("{touch:?}");
         std::thread::scope(|scope| {
             let watching = scope.spawn(|| watch(&config, &open, false, &end, nobody));
             std::thread::sleep(LOOK * 3);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use lager_wake::Policy;
-use lager_wire::ArmProfile;
+use lager_wire::RobotProfile;
 
 use crate::buttons::ButtonsConfig;
 
@@ -24,8 +24,8 @@ pub struct BridgeConfig {
     /// Whether to drive an original steering board, whose commands have no age limit: if this
     /// process dies, it goes on with its last command. If false, such a board only gets standby.
     pub original_boards: bool,
-    /// The arm's limits for the steering board. Their owner has validated them.
-    pub arm: ArmProfile,
+    /// What the boards are told of their robot. Its owner has validated it.
+    pub robot: RobotProfile,
     /// The reset button and the mode switch, if the robot has them.
     pub buttons: Option<ButtonsConfig>,
     /// How to wait for orders and reports.
@@ -43,7 +43,7 @@ impl Default for BridgeConfig {
             resume: false,
             raw_line: false,
             original_boards: false,
-            arm: ArmProfile::default(),
+            robot: RobotProfile::default(),
             buttons: None,
             waiting: Policy::default(),
         }

@@ -1,5 +1,5 @@
-//! The arm's profile on its way to the steering board: sent value by value, put in force as a
-//! whole, verified, and sent again to a board that has come up.
+//! What the boards are told of their robot: sent value by value, put in force as a whole, verified,
+//! and sent again to a board that has come up.
 //!
 //! ```text
 //!            board up            every value and the check value taken
@@ -9,29 +9,193 @@
 //!                    unanswered
 //! ```
 //!
-//! One value is on its way at a time: a board's queue holds five packets, and at 9600 Bd a command
-//! to the wheels must not wait for twenty-five. Until the board has accepted the profile, the
-//! arbiter keeps the arm still, because the board cannot keep limits that it does not know.
+//! One value is on its way to a board at a time: a board's queue holds five packets, and at 9600 Bd a
+//! command to the wheels must not wait for twenty-five. So the steering board hears of its wheels
+//! first, and of the arm when it has answered.
+//!
+//! Until the boards have accepted how motors and sensors are built, the arbiter keeps the wheels
+//! still, because a robot with its motors swapped would drive the other way. Until the steering board
+//! has accepted the arm's profile, the arbiter keeps the arm still, because the board cannot keep
+//! limits that it does not know. A board that was told and has not restarted since is told again
+//! while it moves.
 //!
 //! It is pure. It stands apart from the other settings because it is one thing in many packets, and
 //! no request changes it while the robot runs.
 
 use core::time::Duration;
 
-use lager_topics::ArmProfileState;
-use lager_wire::{ArmProfile, Setting, SettingKey, SettingReply, SettingStatus, Version};
+use heapless::Vec as List;
+use lager_topics::{Health, ProfileState};
+use lager_wire::link::Up;
+use lager_wire::{Callsign, Profile, RobotProfile, Setting, SettingReply, SettingStatus, Version};
 
+use crate::arbiter::Gate;
 use crate::settings::{RETRY, TRIES};
 
 /// How long the bridge waits before it tries a board again that does not answer.
 const PAUSE: Duration = Duration::from_secs(5);
 
-/// The profile and how much of it the board has taken.
+/// More than the longest profile has values.
+const MOST: usize = 32;
+
+/// A part of the robot's description.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Motors, wheels and battery: the steering board's.
+    Steering,
+    /// Line sensors and IR ranger: the sensor board's.
+    Sensors,
+    /// The arm: the steering board's.
+    Arm,
+}
+
+impl Part {
+    /// All parts. Of one board's, the one that it hears first comes first.
+    pub const ALL: [Self; 3] = [Self::Steering, Self::Sensors, Self::Arm];
+
+    /// The board that is told.
+    pub const fn board(self) -> Callsign {
+        match self {
+            Self::Steering | Self::Arm => Callsign::Steering,
+            Self::Sensors => Callsign::Sensor,
+        }
+    }
+
+    /// The sections of the configuration that say it.
+    pub const fn sections(self) -> &'static str {
+        match self {
+            Self::Steering => "[wheels] and [battery]",
+            Self::Sensors => "[line] and [distance]",
+            Self::Arm => "[arm]",
+        }
+    }
+}
+
+/// How far each part has got.
+pub type States = [(Part, ProfileState); 3];
+
+/// All parts of the description, each on its way to its board.
+#[derive(Clone, Debug)]
+pub struct Profiles {
+    tellers: [ProfileTeller; 3],
+}
+
+impl Profiles {
+    /// Sends `robot`, which its owner has validated, to every board that comes up. An earlier
+    /// bridge, if there was one, has told the same.
+    pub fn new(robot: &RobotProfile, kept: Option<&Health>) -> Self {
+        let told = |state: Option<ProfileState>| state == Some(ProfileState::Accepted);
+        let [steering, sensors, arm] = match kept {
+            Some(kept) => [
+                told(kept.steering_profile.get()),
+                told(kept.sensor_profile.get()),
+                told(kept.arm_profile.get()),
+            ],
+            None => [false; 3],
+        };
+        Self {
+            tellers: [
+                ProfileTeller::new(&robot.steering, steering),
+                ProfileTeller::new(&robot.sensors, sensors),
+                ProfileTeller::new(&robot.arm, arm),
+            ],
+        }
+    }
+
+    /// A board has come up and gets everything.
+    pub fn board_up(&mut self, now: Duration, up: &Up) {
+        let forgot = up.fresh || up.rebooted;
+        for (part, teller) in self.parts() {
+            if part.board() == up.callsign {
+                teller.board_up(now, up.version, forgot);
+            }
+        }
+    }
+
+    /// A board is not up any more.
+    pub fn board_down(&mut self, board: Callsign) {
+        for (part, teller) in self.parts() {
+            if part.board() == board {
+                teller.board_down();
+            }
+        }
+    }
+
+    /// The setting to send to `board` now, if any.
+    pub fn poll(&mut self, now: Duration, board: Callsign) -> Option<Setting> {
+        for (part, teller) in self.parts() {
+            if part.board() != board {
+                continue;
+            }
+            let setting = teller.poll(now);
+            if setting.is_some() || teller.state == ProfileState::Telling {
+                return setting;
+            }
+        }
+        None
+    }
+
+    /// When [`Profiles::poll`] next has something to do.
+    pub fn next_due(&self) -> Option<Duration> {
+        let [steering, sensors, arm] = &self.tellers;
+        let arm = (steering.state != ProfileState::Telling).then_some(arm);
+        let tellers = [Some(steering), Some(sensors), arm].into_iter().flatten();
+        tellers.filter_map(ProfileTeller::next_due).min()
+    }
+
+    /// A board has answered. Returns whether the bridge was waiting for this answer.
+    pub fn answer(&mut self, now: Duration, reply: &SettingReply) -> bool {
+        let mut tellers = self.tellers.iter_mut();
+        tellers.any(|teller| teller.answer(now, reply))
+    }
+
+    /// How far each part has got.
+    pub fn states(&self) -> States {
+        let [steering, sensors, arm] = self.tellers.each_ref().map(ProfileTeller::state);
+        [
+            (Part::Steering, steering),
+            (Part::Sensors, sensors),
+            (Part::Arm, arm),
+        ]
+    }
+
+    /// Whether the wheels may move, by what both boards know.
+    pub fn wheels(&self) -> Gate {
+        let [steering, sensors, _] = self.tellers.each_ref().map(ProfileTeller::gate);
+        match (steering, sensors) {
+            (Gate::Open, gate) | (gate, Gate::Open) => gate,
+            (Gate::Shut, _) | (_, Gate::Shut) => Gate::Shut,
+            (Gate::Held, Gate::Held) => Gate::Held,
+        }
+    }
+
+    /// Whether the arm may move.
+    pub fn arm(&self) -> Gate {
+        self.tellers[2].gate()
+    }
+
+    /// Writes its part of `link/health`.
+    pub fn fill(&self, health: &mut Health) {
+        let [steering, sensors, arm] = self.tellers.each_ref().map(ProfileTeller::state);
+        health.steering_profile = steering.into();
+        health.sensor_profile = sensors.into();
+        health.arm_profile = arm.into();
+    }
+
+    fn parts(&mut self) -> impl Iterator<Item = (Part, &mut ProfileTeller)> {
+        Part::ALL.into_iter().zip(&mut self.tellers)
+    }
+}
+
+/// One profile and how much of it the board has taken.
 #[derive(Clone, Debug)]
 pub struct ProfileTeller {
-    values: [u16; ArmProfile::VALUES],
-    state: ArmProfileState,
-    /// How many values the board has taken; the check value comes after the last.
+    /// Every value, and then the check value.
+    settings: List<Setting, MOST>,
+    state: ProfileState,
+    /// The board that was told last has the profile in force, unless it restarts.
+    is_known: bool,
+    /// How many settings the board has taken.
     taken: usize,
     seq: u8,
     tries: u8,
@@ -39,11 +203,13 @@ pub struct ProfileTeller {
 }
 
 impl ProfileTeller {
-    /// Sends `profile`, which its owner has validated, to every board that comes up.
-    pub fn new(profile: &ArmProfile) -> Self {
+    /// Sends `profile`, which its owner has validated, to every board that comes up. `is_known`: the
+    /// board has it from an earlier bridge.
+    pub fn new(profile: &impl Profile, is_known: bool) -> Self {
         Self {
-            values: profile.values(),
-            state: ArmProfileState::NoBoard,
+            settings: profile.settings().collect(),
+            state: ProfileState::NoBoard,
+            is_known,
             taken: 0,
             seq: 0,
             tries: 0,
@@ -51,19 +217,23 @@ impl ProfileTeller {
         }
     }
 
-    /// The steering board has come up and gets everything. An original board knows no profile.
-    pub fn board_up(&mut self, now: Duration, version: Version) {
-        self.board_down();
+    /// The board has come up and gets everything. `forgot`: it has started since it was told. An
+    /// original board knows no profile.
+    pub fn board_up(&mut self, now: Duration, version: Version, forgot: bool) {
+        self.is_known &= !forgot;
+        self.state = ProfileState::NoBoard;
+        self.next_try = None;
         if version == Version::One {
-            self.state = ArmProfileState::Telling;
+            self.state = ProfileState::Telling;
             self.taken = 0;
             self.ask_next(now);
         }
     }
 
-    /// The steering board is not up any more.
+    /// The board is not up any more; another one may come.
     pub fn board_down(&mut self) {
-        self.state = ArmProfileState::NoBoard;
+        self.is_known = false;
+        self.state = ProfileState::NoBoard;
         self.next_try = None;
     }
 
@@ -73,18 +243,14 @@ impl ProfileTeller {
             return None;
         }
         if self.tries == TRIES {
-            self.state = ArmProfileState::Unanswered;
+            self.state = ProfileState::Unanswered;
             self.tries = 0;
             self.next_try = Some(now + PAUSE);
             return None;
         }
         self.tries += 1;
         self.next_try = Some(now + RETRY);
-        Some(Setting {
-            key: self.key(),
-            seq: self.seq,
-            value: self.value(),
-        })
+        self.asked()
     }
 
     /// When [`ProfileTeller::poll`] next has something to do.
@@ -94,17 +260,22 @@ impl ProfileTeller {
 
     /// The board has answered. Returns whether the bridge was waiting for this answer.
     pub fn answer(&mut self, now: Duration, reply: &SettingReply) -> bool {
-        if self.next_try.is_none() || reply.key != self.key() || reply.seq != self.seq {
+        let Some(asked) = self.asked().filter(|_| self.next_try.is_some()) else {
+            return false;
+        };
+        if reply.key != asked.key || reply.seq != asked.seq {
             return false;
         }
-        if reply.status != SettingStatus::Accepted || reply.value != self.value() {
-            self.state = ArmProfileState::Refused;
+        if reply.status != SettingStatus::Accepted || reply.value != asked.value {
+            self.state = ProfileState::Refused;
+            self.is_known = false;
             self.next_try = None;
-        } else if self.taken == self.values.len() {
-            self.state = ArmProfileState::Accepted;
+        } else if self.taken + 1 == self.settings.len() {
+            self.state = ProfileState::Accepted;
+            self.is_known = true;
             self.next_try = None;
         } else {
-            self.state = ArmProfileState::Telling;
+            self.state = ProfileState::Telling;
             self.taken += 1;
             self.ask_next(now);
         }
@@ -112,8 +283,19 @@ impl ProfileTeller {
     }
 
     /// The progress.
-    pub fn state(&self) -> ArmProfileState {
+    pub fn state(&self) -> ProfileState {
         self.state
+    }
+
+    /// Whether what depends on the profile may move. An original board knows no profile and has a
+    /// robot of its own.
+    pub fn gate(&self) -> Gate {
+        match self.state {
+            ProfileState::NoBoard | ProfileState::Accepted => Gate::Open,
+            ProfileState::Telling if self.is_known => Gate::Open,
+            ProfileState::Telling => Gate::Held,
+            ProfileState::Refused | ProfileState::Unanswered => Gate::Shut,
+        }
     }
 
     fn ask_next(&mut self, now: Duration) {
@@ -122,20 +304,17 @@ impl ProfileTeller {
         self.next_try = Some(now);
     }
 
-    fn key(&self) -> SettingKey {
-        ArmProfile::key(self.taken).unwrap_or(SettingKey::ArmProfile)
-    }
-
-    fn value(&self) -> i16 {
-        match self.values.get(self.taken) {
-            Some(value) => value.cast_signed(),
-            None => ArmProfile::check(&self.values),
-        }
+    fn asked(&self) -> Option<Setting> {
+        let setting = self.settings.get(self.taken)?;
+        let seq = self.seq;
+        Some(Setting { seq, ..*setting })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use lager_wire::{ArmProfile, ResetCause, SettingKey};
+
     use super::*;
 
     fn ms(millis: u64) -> Duration {
@@ -152,9 +331,9 @@ mod tests {
     }
 
     fn up() -> ProfileTeller {
-        let mut teller = ProfileTeller::new(&ArmProfile::default());
+        let mut teller = ProfileTeller::new(&ArmProfile::default(), false);
         assert_eq!(teller.poll(ms(0)), None, "nobody is there");
-        teller.board_up(ms(0), Version::One);
+        teller.board_up(ms(0), Version::One, true);
         teller
     }
 
@@ -163,13 +342,13 @@ mod tests {
         let mut teller = up();
         let mut told = Vec::new();
         while let Some(setting) = teller.poll(ms(0)) {
-            assert_eq!(teller.state(), ArmProfileState::Telling);
+            assert_eq!(teller.state(), ProfileState::Telling);
             assert_eq!(teller.poll(ms(0)), None, "one at a time");
             assert!(teller.answer(ms(0), &accepted(&setting)));
             assert!(!teller.answer(ms(0), &accepted(&setting)), "once");
             told.push(setting);
         }
-        assert_eq!(teller.state(), ArmProfileState::Accepted);
+        assert_eq!(teller.state(), ProfileState::Accepted);
         assert_eq!(teller.next_due(), None);
         let values = ArmProfile::default().values();
         assert_eq!(told.len(), values.len() + 1);
@@ -189,10 +368,10 @@ mod tests {
             .filter(|now| teller.poll(ms(*now)).is_some())
             .collect();
         assert_eq!(asked[..5], [0, 60, 120, 180, 5_240]);
-        assert_eq!(teller.state(), ArmProfileState::Unanswered);
+        assert_eq!(teller.state(), ProfileState::Unanswered);
         let setting = teller.poll(ms(11_000)).expect("it goes on asking");
         teller.answer(ms(11_000), &accepted(&setting));
-        assert_eq!(teller.state(), ArmProfileState::Telling);
+        assert_eq!(teller.state(), ProfileState::Telling);
     }
 
     #[test]
@@ -210,7 +389,7 @@ mod tests {
                 ..accepted(&setting)
             };
             assert!(teller.answer(ms(0), &reply));
-            assert_eq!(teller.state(), ArmProfileState::Refused);
+            assert_eq!(teller.state(), ProfileState::Refused);
             assert_eq!(teller.poll(ms(5_000)), None);
         }
     }
@@ -223,12 +402,125 @@ mod tests {
             teller.answer(ms(0), &accepted(&setting));
         }
         teller.board_down();
-        assert_eq!(teller.state(), ArmProfileState::NoBoard);
-        teller.board_up(ms(9), Version::One);
+        assert_eq!(teller.state(), ProfileState::NoBoard);
+        teller.board_up(ms(9), Version::One, true);
         let setting = teller.poll(ms(9)).expect("the first value");
         assert_eq!(ArmProfile::index(setting.key), Some(0));
-        teller.board_up(ms(20), Version::Original);
-        assert_eq!(teller.state(), ArmProfileState::NoBoard);
+        teller.board_up(ms(20), Version::Original, true);
+        assert_eq!(teller.state(), ProfileState::NoBoard);
         assert_eq!(teller.poll(ms(20)), None);
+    }
+    fn board(callsign: Callsign, rebooted: bool) -> Up {
+        Up {
+            callsign,
+            version: Version::One,
+            epoch: 1,
+            reset: ResetCause::PowerOn,
+            rebooted,
+            fresh: false,
+            build: 1,
+        }
+    }
+
+    /// Answers everything that a board is asked; what it was asked.
+    fn obey(profiles: &mut Profiles, callsign: Callsign) -> Vec<Setting> {
+        let mut told = Vec::new();
+        while let Some(setting) = profiles.poll(ms(0), callsign) {
+            assert!(profiles.answer(ms(0), &accepted(&setting)));
+            told.push(setting);
+        }
+        told
+    }
+
+    #[test]
+    fn the_wheels_wait_for_both_boards_and_the_steering_board_hears_of_them_first() {
+        let robot = RobotProfile::default();
+        let mut profiles = Profiles::new(&robot, None);
+        assert_eq!(
+            (profiles.wheels(), profiles.arm()),
+            (Gate::Open, Gate::Open)
+        );
+        profiles.board_up(ms(0), &board(Callsign::Steering, true));
+        assert_eq!(
+            (profiles.wheels(), profiles.arm()),
+            (Gate::Held, Gate::Held)
+        );
+        let told = obey(&mut profiles, Callsign::Steering);
+        let wheels: Vec<_> = robot
+            .steering
+            .settings()
+            .map(|setting| setting.key)
+            .collect();
+        let keys: Vec<_> = told.iter().map(|setting| setting.key).collect();
+        assert_eq!(keys[..wheels.len()], wheels);
+        assert_eq!(keys.len(), wheels.len() + ArmProfile::VALUES + 1);
+        assert_eq!(
+            (profiles.wheels(), profiles.arm()),
+            (Gate::Open, Gate::Open)
+        );
+        profiles.board_up(ms(0), &board(Callsign::Sensor, true));
+        assert_eq!(
+            (profiles.wheels(), profiles.arm()),
+            (Gate::Held, Gate::Open)
+        );
+        obey(&mut profiles, Callsign::Sensor);
+        assert_eq!(profiles.wheels(), Gate::Open);
+    }
+
+    #[test]
+    fn a_board_that_does_not_take_it_keeps_the_wheels_still() {
+        let mut profiles = Profiles::new(&RobotProfile::default(), None);
+        profiles.board_up(ms(0), &board(Callsign::Steering, true));
+        profiles.board_up(ms(0), &board(Callsign::Sensor, true));
+        let setting = profiles.poll(ms(0), Callsign::Sensor).expect("a value");
+        let refused = SettingReply {
+            status: SettingStatus::NotHere,
+            ..accepted(&setting)
+        };
+        assert!(profiles.answer(ms(0), &refused));
+        obey(&mut profiles, Callsign::Steering);
+        assert_eq!(
+            (profiles.wheels(), profiles.arm()),
+            (Gate::Shut, Gate::Open)
+        );
+    }
+
+    #[test]
+    fn a_board_that_was_told_and_did_not_restart_is_told_again_while_it_moves() {
+        let robot = RobotProfile::default();
+        let mut profiles = Profiles::new(&robot, None);
+        profiles.board_up(ms(0), &board(Callsign::Steering, true));
+        obey(&mut profiles, Callsign::Steering);
+        let mut kept = Health::default();
+        profiles.fill(&mut kept);
+        for mut profiles in [profiles, Profiles::new(&robot, Some(&kept))] {
+            profiles.board_up(ms(0), &board(Callsign::Steering, false));
+            assert_eq!(profiles.wheels(), Gate::Open);
+            assert_eq!(profiles.states()[0].1, ProfileState::Telling);
+            obey(&mut profiles, Callsign::Steering);
+            profiles.board_up(ms(0), &board(Callsign::Steering, true));
+            assert_eq!(profiles.wheels(), Gate::Held);
+            obey(&mut profiles, Callsign::Steering);
+            profiles.board_down(Callsign::Steering);
+            profiles.board_up(ms(0), &board(Callsign::Steering, false));
+            assert_eq!(profiles.wheels(), Gate::Held, "it may be another board");
+        }
+    }
+
+    #[test]
+    fn a_board_that_never_answers_hears_of_its_arm_all_the_same() {
+        let mut profiles = Profiles::new(&RobotProfile::default(), None);
+        profiles.board_up(ms(0), &board(Callsign::Steering, true));
+        let mut asked = Vec::new();
+        for now in 0..1_000 {
+            asked.extend(profiles.poll(ms(now), Callsign::Steering));
+        }
+        let keys: Vec<_> = asked.iter().map(|setting| setting.key).collect();
+        assert_eq!(keys[..4], [SettingKey::SteeringSwapped; 4]);
+        assert_eq!(keys[4..], [SettingKey::ArmTorqueLimit; 4]);
+        assert_eq!(
+            (profiles.wheels(), profiles.arm()),
+            (Gate::Shut, Gate::Shut)
+        );
     }
 }

@@ -9,7 +9,7 @@
 //!          open                  gone (unplugged, hung up)
 //!   away ---------> listening ----------------------------> away
 //!    | ^
-//!    +-+ cannot be opened: again after 20, 40, ... 250 ms, said once
+//!    +-+ cannot be opened: again after 20, 40, ... 250 ms, said once; or lent
 //! ```
 
 use std::path::Path;
@@ -28,6 +28,7 @@ use lager_wire::Callsign;
 use crate::counts::Counts;
 use crate::events::PortEvent;
 use crate::listener::{Heard, Listener};
+use crate::loan::Loan;
 use crate::serial::{OpenPortError, PortGone, SerialPort};
 
 /// A reader's message to the main loop: an event, and with [`PortEvent::Opened`] the port, because
@@ -59,6 +60,7 @@ pub(crate) struct Reader<'a> {
     counts: &'a Counts,
     /// Set when the readers are to end.
     end: &'a AtomicBool,
+    loan: &'a Loan<'a>,
     sensor: SensorOut,
 }
 
@@ -83,7 +85,7 @@ impl<'a> Reader<'a> {
         bus: &'a Bus,
         events: Producer<'a, Handed>,
         ringer: Ringer,
-        (counts, end): (&'a Counts, &'a AtomicBool),
+        (counts, end, loan): (&'a Counts, &'a AtomicBool, &'a Loan<'a>),
     ) -> Self {
         Self {
             place,
@@ -95,6 +97,7 @@ impl<'a> Reader<'a> {
             ringer,
             counts,
             end,
+            loan,
             sensor: SensorOut::default(),
         }
     }
@@ -104,6 +107,11 @@ impl<'a> Reader<'a> {
         let mut pause = FIRST_PAUSE;
         let mut complaint = None;
         while !self.stopped() {
+            if self.loan.is_lent() {
+                pause = FIRST_PAUSE;
+                self.sleep(pause);
+                continue;
+            }
             match SerialPort::open(self.path, self.baud) {
                 Ok(port) => {
                     // The span lasts as long as the port is there. No frame is traced.
@@ -142,14 +150,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads until the port has gone or the bridge stops.
+    /// Reads until the port has gone or is lent, or the bridge stops.
     fn listen(&mut self, port: &SerialPort) -> Result<(), PortGone> {
         let mut listener = Listener::new(self.place);
         let mut buffer = [0; 512];
         // The moment up to which all bytes were read. A board counts as silent only up to such a
         // moment: a reader that could not run finds the bytes first and then the time.
         let mut heard = self.clock.now();
-        while !self.stopped() {
+        while !self.stopped() && !self.loan.is_lent() {
             let mut ring = false;
             while let Some(what) = listener.poll(heard, self.counts) {
                 ring |= self.take(what, 0);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use lager_bridge::buttons::{ButtonsConfig, Touch, open, watch};
+use lager_bridge::buttons::{ButtonsConfig, SwitchKind, Touch, open, watch};
 use lager_orders::Mode;
 
 const SIMULATOR: &str = "/sys/kernel/config/gpio-sim";
@@ -68,13 +68,15 @@ fn what_people_do_to_the_lines_of_a_chip_is_heard() {
         chip: chip.device.clone(),
         reset: Some(RESET),
         switch: Some(SWITCH),
+        switch_kind: SwitchKind::Position,
+        reset_starts: true,
         debounce: Duration::from_millis(5),
     };
     let end = AtomicBool::new(false);
     let (to, touches) = mpsc::channel();
     std::thread::scope(|scope| {
         scope.spawn(|| {
-            watch(&config, &open, false, &end, |touch| {
+            watch(&config, &open, false, &end, |touch, _| {
                 to.send(touch).expect("it is waited for");
             });
         });

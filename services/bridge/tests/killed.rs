@@ -127,9 +127,9 @@ impl Scene {
 
 fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
     let mut scene = Scene::new();
-    scene.hands.wait_for_health("both boards are up", |health| {
-        health.sensor.up == 1 && health.steering.up == 1
-    });
+    scene
+        .hands
+        .wait_for_health("both boards are ready", |health| health.boards_are_ready());
     scene.hands.set_mode(Mode::Autonomous);
     let mut finishes = [0, 0];
     for round in 1..=6_u32 {
@@ -184,9 +184,9 @@ fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
 /// none of them has ended when it goes on.
 fn a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older() {
     let mut scene = Scene::new();
-    scene.hands.wait_for_health("both boards are up", |health| {
-        health.sensor.up == 1 && health.steering.up == 1
-    });
+    scene
+        .hands
+        .wait_for_health("both boards are ready", |health| health.boards_are_ready());
     scene.hands.set_mode(Mode::Autonomous);
     let process = scene.bridge.as_ref().unwrap().pid();
     let process = Pid::from_raw(i32::try_from(process).unwrap()).unwrap();

@@ -52,7 +52,7 @@
 
 use core::ops::Range;
 use core::time::Duration;
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 
 use lager_battery::{Battery, Pack};
 use lager_floor::ProductId;
@@ -64,11 +64,12 @@ use lager_lines::splitter::LineError;
 use lager_operator::{Driving, For, Orders};
 use lager_orders::lease::{COMMAND, LATEST, LATEST_MOVE, TooLate};
 use lager_orders::{Code, Mode, Moment, Reason};
-use lager_topics::{Event, Phase, Role, WarehouseMap};
+use lager_topics::{Event, Phase, WarehouseMap};
 use lager_wire::OperatorCommand;
 
 use crate::effect::Effect;
 use crate::known::Known;
+use crate::lives::Lives;
 use crate::lost::{LinkLost, Standing};
 use crate::map::Described;
 use crate::memory::Memory;
@@ -162,8 +163,8 @@ pub struct Conversation {
     battery: Battery,
     /// What has happened lately.
     memory: Memory,
-    /// The services of the robot, and since when each lives, from their samples' stamps.
-    lives: HashMap<Role, u64>,
+    /// Which services have ended.
+    lives: Lives,
     orders: Orders<Asker>,
     driving: Driving,
     /// Stops that wait for their confirmation, and when they came.
@@ -206,7 +207,7 @@ impl Conversation {
             telling: Telling::default(),
             battery: Battery::default(),
             memory: Memory::default(),
-            lives: HashMap::new(),
+            lives: Lives::default(),
             orders: Orders::default(),
             driving: Driving::default(),
             stops: Vec::new(),

@@ -8,6 +8,7 @@ use lager_lines::Name;
 use lager_lines::extension::{Findings, Health, Release, Report, Service, Services};
 use lager_orders::Moment;
 use lager_topics::BoardHealth;
+use lager_wire::BUILD;
 
 use crate::known::{Known, Machine};
 
@@ -17,9 +18,9 @@ pub(crate) fn report(now: Moment, known: &Known) -> Report {
         load_percent,
         cores,
         memory_mib,
-        services,
         found,
     } = &known.machine;
+    let services = &known.services;
     let age_ms = |board: usize| {
         let age_ns = known.boards_ns[board].map(|at| now.ns.saturating_sub(at));
         age_ns.map(|ns| u32::try_from(ns / 1_000_000).unwrap_or(u32::MAX))
@@ -29,6 +30,7 @@ pub(crate) fn report(now: Moment, known: &Known) -> Report {
     let version = |board: &BoardHealth| {
         Some(board.version).filter(|version| *version != BoardHealth::UNKNOWN)
     };
+    let build = |board: &BoardHealth| version(board).map(|_| board.build);
     let service = |watched: &Watched| {
         let since_ns = now.ns.saturating_sub(watched.since_ns);
         Some(Service {
@@ -50,6 +52,9 @@ pub(crate) fn report(now: Moment, known: &Known) -> Report {
         steering_age_ms: age_ms(1),
         sensor_version: sensor.as_ref().and_then(version),
         steering_version: steering.as_ref().and_then(version),
+        sensor_build: sensor.as_ref().and_then(build),
+        steering_build: steering.as_ref().and_then(build),
+        program_build: Some(BUILD),
         sensor_restarts: sensor.map(|board| board.reboots),
         steering_restarts: steering.map(|board| board.reboots),
         sensor_damaged: sensor.map(|board| board.bad_crc),

@@ -31,6 +31,8 @@ pub(crate) struct Known {
     pub(crate) trip_ms: Option<u32>,
     /// How the machine is.
     pub(crate) machine: Machine,
+    /// The services that `lager up` keeps alive.
+    pub(crate) services: Vec<Watched>,
     /// The warehouse that this process or an earlier one has published.
     pub(crate) map: Option<Box<WarehouseMap>>,
 }
@@ -62,7 +64,7 @@ pub struct Senses {
     pub truth: Option<Box<Truth>>,
 }
 
-/// How the robot's machine and its services are, at one moment.
+/// How the robot's machine is, at one moment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Machine {
     /// How many processes want a core, in percent of the cores; `None` is not known.
@@ -71,8 +73,6 @@ pub struct Machine {
     pub cores: Option<u16>,
     /// All its memory and what programs can still get, in MiB.
     pub memory_mib: Option<[u32; 2]>,
-    /// The services that `lager up` keeps alive.
-    pub services: Vec<Watched>,
     /// What is wrong with the machine.
     pub found: Vec<Finding>,
 }

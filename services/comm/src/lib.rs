@@ -18,6 +18,7 @@ mod effect;
 mod health;
 mod known;
 mod link;
+mod lives;
 mod lost;
 mod map;
 mod memory;

@@ -39,6 +39,12 @@ use crate::telling;
 /// no further process to wake.
 const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
+/// How often comm looks into the robot's folder, in ns of real time.
+const LOOK: u64 = 200_000_000;
+/// How long ago, in ns, people may have asked for something that this process tells: another one may
+/// have died before it could. A station knows again what it was told within this time.
+const RECALLED: u64 = 3_000_000_000;
+
 /// Why a request was not sent.
 const BUSY: Code = Code::TooMuchAsked;
 
@@ -58,7 +64,7 @@ pub struct CommConfig {
     pub pack: Pack,
     /// Whether to take over the map of an earlier comm.
     pub resume: bool,
-    /// Finds out how this machine is, but for its services, in well under a millisecond.
+    /// Finds out how this machine is, in well under a millisecond.
     pub machine: fn() -> Machine,
 }
 
@@ -114,6 +120,10 @@ struct Shell {
     home: Home,
     robot: UnitName,
     machine: fn() -> Machine,
+    /// When it looks into the robot's folder next.
+    looks_ns: u64,
+    /// When somebody last asked for something that was told.
+    asked_ns: u64,
 
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
@@ -137,6 +147,12 @@ struct Shell {
     complaints: u32,
 }
 
+impl Drop for Shell {
+    fn drop(&mut self) {
+        self.home.forget_asked(&self.robot);
+    }
+}
+
 impl Shell {
     fn new(opening: &Opening<'_>, config: &CommConfig) -> Result<Self, PortError> {
         let Opening { bus, watchdog } = opening;
@@ -156,6 +172,8 @@ impl Shell {
             robot: config.name.clone(),
             secret: config.secret.clone(),
         };
+        // Nothing of it is needed to drive.
+        let _ = bus.home().listen_asked(bus.unit());
         let mut shell = Self {
             clock: bus.clock(),
             link: Link::new(wanted, waiter.ringer()).map_err(|error| PortError::Thread {
@@ -172,6 +190,8 @@ impl Shell {
             home: bus.home().clone(),
             robot: bus.unit().clone(),
             machine: config.machine,
+            looks_ns: 0,
+            asked_ns: Clock::monotonic_ns().saturating_sub(RECALLED),
             health: opening.subscriber()?,
             status: opening.subscriber()?,
             queue: opening.subscriber()?,
@@ -208,6 +228,7 @@ impl Shell {
         self.conversation.turn(now);
         self.act();
         // First the robot's state, so that lines meet the conversation as it is now.
+        self.look(now);
         self.take_samples(now);
         self.take_answers();
         self.take_lines(now);
@@ -232,9 +253,23 @@ impl Shell {
         }
     }
 
+    /// Looks at what stands in the robot's folder: its services, and what people have ordered in a
+    /// terminal.
+    fn look(&mut self, now: Moment) {
+        if now.ns < self.looks_ns {
+            return;
+        }
+        self.looks_ns = now.ns + LOOK;
+        for (at_ns, words) in self.home.asked(&self.robot, self.asked_ns) {
+            self.asked_ns = at_ns;
+            self.conversation.asked(at_ns, &words);
+        }
+        let services = self.home.watched(&self.robot);
+        self.conversation.services(now, services);
+    }
+
     fn take_samples(&mut self, now: Moment) {
         if let Some(health) = self.next(|shell| shell.health.latest()) {
-            self.conversation.lives(now, Role::Bridge, health.stamp());
             self.conversation.health(now, &health);
         }
         // Logic publishes queue and route before their status, so what is read after the status is
@@ -248,7 +283,6 @@ impl Shell {
         }
         if let Some(status) = status {
             let published_ns = status.stamp().publish_time_ns;
-            self.conversation.lives(now, Role::Logic, status.stamp());
             self.conversation.status(now, &status, published_ns);
         }
         while let Some(event) = self.next(|shell| shell.events.receive()) {
@@ -265,10 +299,7 @@ impl Shell {
             // Read this last, so that it is as new as possible.
             self.take_senses();
             if self.conversation.is_to_tell_health(now) {
-                self.conversation.machine(Machine {
-                    services: self.home.watched(&self.robot),
-                    ..(self.machine)()
-                });
+                self.conversation.machine((self.machine)());
             }
             self.conversation.tell(now);
         }
@@ -278,10 +309,6 @@ impl Shell {
     /// is enough.
     fn take_senses(&mut self) {
         let truth = self.next(|shell| shell.truth.latest());
-        if let Some(truth) = &truth {
-            let now = self.now();
-            self.conversation.lives(now, Role::Simulator, truth.stamp());
-        }
         let senses = Senses {
             line: self.next(|shell| shell.line.latest()).map(|line| *line),
             distance: self

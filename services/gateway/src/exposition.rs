@@ -231,6 +231,17 @@ fn links(text: &mut Text, figures: &Figures) {
             counter.add(&[("board", board)], of(health));
         }
     }
+    let mut fits = text.gauge(
+        "lager_board_image_fits",
+        "Whether the board's image, of this build, is the one of this program; if not, `lager board \
+         update` helps. An original board has build 0 and is none of ours, so it fits.",
+    );
+    let known = |(_, health): &&(_, BoardHealth)| health.version != BoardHealth::UNKNOWN;
+    for (board, health) in boards.iter().filter(known) {
+        let build = health.build.to_string();
+        let is_fit = u8::from(health.misfit().is_none());
+        fits.add(&[("board", board), ("build", &build)], is_fit);
+    }
     let mut load = text.gauge(
         "lager_board_load_ratio",
         "Processor load of the board, from 0 to 1.",

@@ -1,10 +1,12 @@
 //! The command line: every subcommand, flag and example. No behaviour lives here.
 
 mod bag;
+mod board;
 mod gateway;
 pub mod help;
 mod ordered;
 mod realtime;
+mod report;
 mod simulate;
 mod top;
 mod topic;
@@ -20,9 +22,11 @@ use lager_supervisor::Parent;
 use lager_wire::{OperatorCommand, Speed};
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
+pub use board::{BoardArgs, BoardCommand, FlashArgs, PortArgs, ResetArgs, UpdateArgs};
 pub use gateway::GatewayArgs;
 pub use ordered::{Button, MapChange, ObstacleChange, Ordered, Plain, QueueChange};
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
+pub use report::ReportArgs;
 pub use simulate::SimulateArgs;
 pub use top::TopArgs;
 pub use topic::{TopicArgs, TopicCommand};
@@ -159,11 +163,18 @@ pub enum Command {
         #[command(flatten)]
         realtime: UpRealtimeArgs,
     },
+    /// Give the boards new images, restart them, or set up a new chip
+    Board(BoardArgs),
+    /// Pack logs, configuration and versions into one file for a bug report, without secrets
+    Report(ReportArgs),
     /// Print the configuration in force, with every key
     Config {
         /// Print an iceoryx2.toml instead, with which other iceoryx2 programs can join the bus
         #[arg(long)]
         iceoryx2: bool,
+        /// Print only how the robot is built: a robot.toml for another machine
+        #[arg(long, conflicts_with = "iceoryx2")]
+        robot: bool,
     },
     /// The service that talks to the external computer, and the only one with a socket to the
     /// network
@@ -212,6 +223,13 @@ commands that wait. Only one GaG can be connected at a time.")]
     Completions {
         /// Which shell
         shell: clap_complete::Shell,
+    },
+    /// Write the manual pages of this command line into a folder
+    #[command(after_help = "Examples:
+  lager manual ~/.local/share/man/man1")]
+    Manual {
+        /// The folder, which is made if it is not there
+        folder: PathBuf,
     },
     /// Does what `up` needs on the bus; only `up` starts it
     #[command(hide = true)]

@@ -4,6 +4,7 @@
 //! every child process the effective configuration on its standard input, so a flag reaches all of
 //! them or none. An unknown key is an error.
 
+mod battery;
 mod bus;
 mod buttons;
 mod chip;
@@ -12,6 +13,7 @@ mod gateway;
 mod invalid;
 mod logic;
 mod realtime;
+mod robot;
 mod section;
 mod station;
 
@@ -32,9 +34,13 @@ use lager_supervisor::Service;
 use lager_supervisor::runtime_folder::RuntimeFolder;
 use lager_supervisor::state_folder;
 use lager_topics::LAGER;
-use lager_wire::ArmProfile;
+use lager_wire::{
+    ArmProfile, LineProfile, RangerProfile, RobotProfile, SensorProfile, SteeringProfile,
+    WheelsProfile,
+};
 use serde::{Deserialize, Serialize};
 
+pub use battery::BatterySection;
 pub use bus::{BusSection, Waiting};
 pub use buttons::ButtonsSection;
 pub use chip::ChipSection;
@@ -48,6 +54,9 @@ use section::section;
 
 use crate::meant::meant;
 use crate::realtime::HIGHEST_PRIORITY;
+
+/// The built-in warehouse of a simulated or emulated robot whose warehouse nobody names.
+pub const SIMULATED_WAREHOUSE: &str = "small";
 
 /// The baud rates of the boards: today's, and the original's (UBRR 103).
 pub const BAUD_RATES: [u32; 2] = [500_000, 9_600];
@@ -67,18 +76,29 @@ section! {
         /// What the services drive: "sim", the simulated robot, "chip", the boards' real images in an
         /// emulator, or "serial", the boards at [serial].
         pub body: Body = Body::Sim,
-        /// A built-in warehouse (small, curved, large) or the path of a warehouse file.
-        pub warehouse: String = "small".into(),
-        /// The folder that keeps what outlives `lager up`: changes that the panel made to a
-        /// built-in warehouse (changes to a file are saved in the file), the orders that wait, and
-        /// which goods a real robot has not found in their place. Unset, .state in the folder of
-        /// the bus if one is named, else $STATE_DIRECTORY, else $XDG_STATE_HOME/lager, else
-        /// ~/.local/state/lager.
+        /// A built-in warehouse (small, curved, large) or the path of a warehouse file. Unset, a
+        /// simulated or emulated robot has the built-in "small". Real boards then wait for a
+        /// warehouse that somebody sets up at the panel, which is kept in the state folder.
+        pub warehouse: Option<String> = None,
+        /// The folder that keeps what outlives `lager up`: a warehouse that was set up at the
+        /// panel, or the panel's changes to a built-in one (changes to a file are saved in the file), the
+        /// orders that wait, and which goods a real robot has not found in their place. Unset,
+        /// .state in the folder of the bus if one is named, else $STATE_DIRECTORY, else
+        /// $XDG_STATE_HOME/lager, else ~/.local/state/lager.
         pub state: Option<PathBuf> = None,
+        /// The file that describes how this robot is built, as it goes from machine to machine: the
+        /// sections [wheels], [line], [distance], [battery] and [arm]. Unset, real boards have
+        /// robot.toml in their robot's state folder, if there is one. A section stands in one of
+        /// the two files.
+        pub robot: Option<PathBuf> = None,
         pub log: LogSection = LogSection::default(),
         pub bus: BusSection = BusSection::default(),
         pub realtime: RealtimeSection = RealtimeSection::default(),
         pub serial: SerialSection = SerialSection::default(),
+        pub wheels: WheelsProfile = WheelsProfile::default(),
+        pub line: LineProfile = LineProfile::default(),
+        pub distance: RangerProfile = RangerProfile::default(),
+        pub battery: BatterySection = BatterySection::default(),
         pub arm: ArmProfile = ArmProfile::default(),
         pub logic: LogicSection = LogicSection::default(),
         pub simulator: SimulatorSection = SimulatorSection::default(),
@@ -134,8 +154,10 @@ section! {
         pub steering: PathBuf = "/dev/lager-steering".into(),
         /// Baud rate of both: 500000, or 9600 for boards of the original build.
         pub baud: u32 = BAUD_RATES[0],
-        /// Whether the sensor board also sends the raw reading of all eleven sensors.
-        pub raw_line: bool = false,
+        /// Whether the sensor board also sends which of its eleven sensors see tape, for the view
+        /// *Line* and for programs. Unset, it does at 500000 Bd, where these bits make a frame
+        /// 0.2 ms later, and not at 9600 Bd, where they would take 11 ms.
+        pub raw_line: Option<bool> = None,
         /// Whether to drive an original steering board. Its commands have no age limit. Boards of
         /// this project stop the wheels within 200 ms whatever dies; an original board goes on with
         /// its last command until the bridge, or its power switch, makes it stand. If false, the
@@ -153,6 +175,13 @@ section! {
         /// How many things come and go on the ways of the simulated floor, at random: 0 to 64. They
         /// need squares of 50 cm or more.
         pub obstacles: u32 = 0,
+    }
+}
+
+impl SerialSection {
+    /// Whether the sensor board is to send its raw readings.
+    pub fn tells_raw_line(&self) -> bool {
+        self.raw_line.unwrap_or(self.baud == BAUD_RATES[0])
     }
 }
 
@@ -223,6 +252,8 @@ impl Config {
                 self.realtime.priority
             );
         }
+        self.wheels.validate()?;
+        self.distance.validate()?;
         self.arm.validate()?;
         Ok(())
     }
@@ -250,16 +281,40 @@ impl Config {
         })
     }
 
-    /// The warehouse, built in or from its file, checked. Also checks that it has room for the
-    /// things that come and go there.
-    pub fn warehouse(&self) -> Result<Warehouse> {
-        let warehouse = warehouse(&self.warehouse)?;
-        if self.body != Body::Serial && self.simulator.obstacles > 0 {
+    /// The name or file of the warehouse; `None` if real boards wait for one.
+    pub fn warehouse_name(&self) -> Option<&str> {
+        match (&self.warehouse, self.body) {
+            (Some(name), _) => Some(name),
+            (None, Body::Serial) => None,
+            (None, Body::Sim | Body::Chip) => Some(SIMULATED_WAREHOUSE),
+        }
+    }
+
+    /// The warehouse, built in or from its file, checked. `None` if real boards wait for one.
+    pub fn known_warehouse(&self) -> Result<Option<Warehouse>> {
+        match (self.warehouse_name(), self.body) {
+            (None, _) => Ok(None),
+            (Some(name), Body::Serial) => warehouse(name).map(Some),
+            (Some(_), Body::Sim | Body::Chip) => self.simulated_warehouse().map(Some),
+        }
+    }
+
+    /// The warehouse of a simulated world, also of one behind the ports of real boards.
+    pub fn simulated_warehouse(&self) -> Result<Warehouse> {
+        let name = self.warehouse.as_deref().unwrap_or(SIMULATED_WAREHOUSE);
+        let warehouse = warehouse(name)?;
+        if self.simulator.obstacles > 0 {
             warehouse
                 .has_room_for_things()
-                .with_context(|| format!("no things can come and go in {}", self.warehouse))?;
+                .with_context(|| format!("no things can come and go in {name}"))?;
         }
         Ok(warehouse)
+    }
+
+    /// The warehouse, where the caller needs one: see [`Self::known_warehouse`].
+    pub fn warehouse(&self) -> Result<Warehouse> {
+        let known = self.known_warehouse()?;
+        known.context("the robot has no warehouse yet; set one up at the panel, or name one (`lager up --warehouse FILE`)")
     }
 
     /// Who picks the goods up: from the configuration, or by the kind of body.
@@ -268,6 +323,21 @@ impl Config {
             Body::Serial => Pick::Manual,
             Body::Sim | Body::Chip => Pick::Auto,
         })
+    }
+
+    /// What the boards are told of their robot.
+    pub fn robot(&self) -> RobotProfile {
+        RobotProfile {
+            steering: SteeringProfile {
+                wheels: self.wheels,
+                divider: self.battery.divider.unwrap_or(self.body != Body::Serial),
+            },
+            sensors: SensorProfile {
+                line: self.line,
+                ranger: self.distance,
+            },
+            arm: self.arm,
+        }
     }
 
     /// The robot's battery.
@@ -281,13 +351,15 @@ impl Config {
     /// The navigator's part of the configuration.
     pub fn navigator(&self) -> lager_logic::LogicConfig {
         lager_logic::LogicConfig {
+            duty: self.wheels.duty,
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
             sensor_ahead_mm: self.logic.sensor_ahead_mm,
-            turn_deg_per_s: self.logic.turn_deg_per_s,
+            turn_deg_per_s: 360_000.0 / f32::from(self.wheels.full_turn_ms),
             tape_mm: self.logic.tape_mm,
             ranger_ahead_mm: self.logic.ranger_ahead_mm,
             low_battery_decivolts: self.logic.low_battery_decivolts,
-            ranger_cm: self.logic.ranger_cm,
+            // No ranger sees farther than its model.
+            ranger_cm: self.logic.ranger_cm.min(self.distance.range_cm().1),
             try_again: Duration::from_secs(self.logic.try_again_s.into()),
             reach_shoulder: self.logic.reach_shoulder,
             reach_elbow: self.logic.reach_elbow,
@@ -407,7 +479,9 @@ mod tests {
             ("[logic]\nsensor_ahead_mm = 0.0", "20 to 400"),
             ("[logic]\nsensor_ahead_mm = inf", "sensor_ahead_mm is inf"),
             ("[logic]\nsensor_ahead_mm = 160000.0", "sensor_ahead_mm"),
-            ("[logic]\nturn_deg_per_s = 0.0", "turn_deg_per_s is 0"),
+            ("[wheels]\nfull_turn_ms = 0", "full_turn_ms is 0"),
+            ("[wheels]\nduty = 255", "40 to 200"),
+            ("[distance]\nmodel = \"own\"\nnear_cm = 90", "smaller"),
             ("[logic]\nreach_elbow = 1024", "reach_elbow is 1024"),
             ("[logic]\ntape_mm = 90.0", "5 to 50"),
             ("[logic]\nranger_ahead_mm = -1.0", "ranger_ahead_mm is -1"),
@@ -449,6 +523,19 @@ mod tests {
         assert_eq!(config.navigator().waiting, config.bus.policy());
         let config: Config = toml::from_str("[bus]\nwaiting = \"adaptive\"").expect("valid");
         assert_eq!(config.bus.policy(), Policy::ADAPTIVE);
+    }
+
+    #[test]
+    fn raw_readings_come_unasked_where_they_cost_little() {
+        for (text, are_told) in [
+            ("", true),
+            ("raw_line = false", false),
+            ("baud = 9600", false),
+            ("baud = 9600\nraw_line = true", true),
+        ] {
+            let config: Config = toml::from_str(&format!("[serial]\n{text}")).expect("valid");
+            assert_eq!(config.serial.tells_raw_line(), are_told, "{text}");
+        }
     }
 
     #[test]

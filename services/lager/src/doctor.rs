@@ -3,7 +3,7 @@
 //! Each check looks at one thing and returns a finding. Only `--fix` changes anything: it removes
 //! what dead processes left on the bus. This process opens nothing of the bus that could block it.
 
-mod ports;
+mod boards;
 mod realtime;
 pub mod soon;
 
@@ -22,7 +22,7 @@ use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
 use crate::overload::{self, Load};
-use crate::{diagnose, exit};
+use crate::{diagnose, exit, ports};
 
 /// Shared memory that a robot needs, in MiB: 1 when it runs alone, more with every observer.
 const SHARED_MEMORY_MIB: u64 = 16;
@@ -60,6 +60,7 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
         ("shared memory", shared_memory()),
         ("open files", open_files()),
         ("load", load()),
+        ("robot", robot(config)),
         ("serial rights", serial(config)),
         ("original boards", original_boards(config)),
         ("emulated boards", emulated(config)),
@@ -67,6 +68,7 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
         ("versions", versions()),
         ("calendar", calendar()),
     ];
+    checks.extend(boards::findings(config));
     checks.extend(realtime::findings(config));
     // Bad results come first.
     checks.sort_by_key(|(_, finding)| !matches!(finding, Bad(_)));
@@ -256,6 +258,19 @@ fn open_files() -> Finding {
         ));
     }
     Good(format!("a process may open {limit}"))
+}
+
+/// How the robot is built, as its boards are told, and where that stands.
+fn robot(config: &Config) -> Finding {
+    let built = config.built();
+    match config.robot_file() {
+        Ok(Some(file)) => Good(format!("{built}, says {}", file.display())),
+        Ok(None) if config.body == Body::Serial => Good(format!(
+            "{built}, says the configuration; a robot.toml in the state folder would say more"
+        )),
+        Ok(None) => Good(built),
+        Err(error) => Hint(format!("{error:#}")),
+    }
 }
 
 /// systemd removes a user's shared memory at logout unless its configuration says otherwise.

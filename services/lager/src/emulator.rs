@@ -51,7 +51,7 @@ pub fn run(bus: &Bus, config: &Config, resume: bool, shutdown: &Shutdown) -> Res
     };
     let truth = bus.publisher::<TruthPose>()?;
     let hands = bus.server::<WorldRequest>()?;
-    let warehouse = config.warehouse()?;
+    let warehouse = config.simulated_warehouse()?;
     let mut emulator = Emulator::start(config, &warehouse, kept.as_ref().map(|(truth, _)| truth))?;
     while !shutdown.is_requested() {
         let mut heard = Ok(true);

@@ -24,6 +24,19 @@ pub struct Usage(pub String);
 #[error("interrupted")]
 pub struct Interrupted;
 
+/// Somebody else has the boards.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "another `lager board` or `lager doctor` is at work on the boards of the robot `{name}`, or the \
+     robot is just starting (process {pid}); do this again when that has ended"
+)]
+pub struct InUse {
+    /// Its name.
+    pub name: String,
+    /// Whoever has the name.
+    pub pid: String,
+}
+
 /// Whether another attempt may succeed: other processes were just making or removing a file that
 /// this one needed. On a busy machine that may take longer than this one waits.
 fn may_try_again(error: &anyhow::Error) -> bool {
@@ -59,10 +72,12 @@ pub fn code_of_service(error: &anyhow::Error) -> ExitCode {
 pub fn code(error: &anyhow::Error) -> ExitCode {
     if error.is::<Usage>() {
         ExitCode::from(2)
-    } else if matches!(
-        error.downcast_ref(),
-        Some(LockError::Up { .. } | LockError::Service { .. })
-    ) {
+    } else if error.is::<InUse>()
+        || matches!(
+            error.downcast_ref(),
+            Some(LockError::Up { .. } | LockError::Service { .. })
+        )
+    {
         ExitCode::from(4)
     } else if error.is::<crate::realtime::RealtimeError>() {
         ExitCode::from(5)
@@ -75,7 +90,10 @@ pub fn code(error: &anyhow::Error) -> ExitCode {
 
 /// Whether the machine may have caused an error, and not the user's request.
 pub fn may_have_a_cause(error: &anyhow::Error) -> bool {
-    !error.is::<Usage>() && !error.is::<Interrupted>() && !error.is::<LockError>()
+    !error.is::<Usage>()
+        && !error.is::<Interrupted>()
+        && !error.is::<LockError>()
+        && !error.is::<InUse>()
 }
 
 /// The mission ended, but not every product was delivered.

@@ -40,16 +40,18 @@ pub fn described(config: &Config) -> Result<Warehouse> {
             "only the external computer knows the names of goods, and it is not the robot's own; give the number, which `lager map` shows"
         );
     }
-    configured(config)
-}
-
-/// The configured warehouse, if a station can tell robots of it.
-///
-/// # Errors
-/// No station can.
-pub fn configured(config: &Config) -> Result<Warehouse> {
     let warehouse = config.warehouse()?;
     told(&warehouse)?;
+    Ok(warehouse)
+}
+
+/// The configured warehouse, if there is one.
+///
+/// # Errors
+/// No station can tell robots of it.
+pub fn configured(config: &Config) -> Result<Option<Warehouse>> {
+    let warehouse = config.known_warehouse()?;
+    warehouse.as_ref().map(told).transpose()?;
     Ok(warehouse)
 }
 

@@ -9,6 +9,7 @@
 mod address;
 mod bag;
 mod bench;
+mod board;
 mod cli;
 mod comm;
 mod config;
@@ -22,8 +23,11 @@ mod goods;
 mod hint;
 mod meant;
 mod overload;
+mod ports;
 mod reach;
 mod realtime;
+mod report;
+mod shell;
 mod sigbus;
 mod simulate;
 mod stack;
@@ -36,6 +40,7 @@ mod topic;
 mod traces;
 mod up;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -51,11 +56,11 @@ use lager_supervisor::children::adopt;
 use lager_supervisor::console;
 use lager_supervisor::runtime_folder::RuntimeFolder;
 use lager_supervisor::signals;
-use lager_topics::Role;
+use lager_topics::{Role, StopCause};
 use lager_wake::{Shutdown, Watchdog};
 use lager_wire::OperatorCommand;
 
-use crate::cli::{Cli, Command, GlobalArgs, ServiceArgs, TopicArgs, TopicCommand};
+use crate::cli::{Cli, Command, ServiceArgs, TopicArgs, TopicCommand};
 use crate::config::{Body, ChipSection, Config};
 use crate::steer::Operator;
 use crate::time_limit::TimeLimit;
@@ -72,7 +77,7 @@ fn main() -> ExitCode {
     let mut speaker = Speaker::Tool;
     let mut looked_at = None;
     let is_supervised = as_whom(&cli.command).is_some_and(|(_, parent)| parent.is_some());
-    let begun = signals::outlive_long_files().and_then(|()| configure(&cli.global));
+    let begun = signals::outlive_long_files().and_then(|()| configure(&cli));
     let ended = begun.and_then(|config| {
         looked_at = Some(config.clone());
         let own = own_voice(&cli.command, &config);
@@ -156,9 +161,9 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                 let bridge = BridgeConfig {
                     ports: [config.serial.sensor.clone(), config.serial.steering.clone()],
                     baud: config.serial.baud,
-                    raw_line: config.serial.raw_line,
+                    raw_line: config.serial.tells_raw_line(),
                     original_boards: config.serial.original_boards,
-                    arm: config.arm,
+                    robot: config.robot(),
                     buttons: config.buttons.lines(),
                     waiting: config.bus.policy(),
                     resume,
@@ -185,7 +190,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                 &shutdown,
                 |bus, resume, _| {
                     let simulator = SimulatorConfig {
-                        warehouse: config.warehouse()?,
+                        warehouse: config.simulated_warehouse()?,
                         seed: config.simulator.seed,
                         obstacles: config.simulator.obstacles,
                         baud: config.serial.baud,
@@ -259,9 +264,17 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             top::run(&config, &args, &patience()?)?;
             return Ok(ExitCode::SUCCESS);
         }
-        Command::Completions { shell } => return Ok(topic::completions(shell)),
+        Command::Completions { shell } => return Ok(shell::completions(shell)),
+        Command::Manual { folder } => {
+            shell::manual(&folder)?;
+            return Ok(ExitCode::SUCCESS);
+        }
         Command::Bag(args) => return bag::run(&config, args, &shutdown),
         Command::Bench { arguments } => return Err(bench::become_it(&arguments)),
+        Command::Board(args) => {
+            board::run(&config, &args, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
+        }
         Command::Doctor {
             fix,
             json,
@@ -271,10 +284,14 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             TimeLimit::new(&config, &shutdown)?;
             return doctor::run(&config, fix, json);
         }
-        Command::Config { iceoryx2: true } => config.bus()?.iceoryx2_toml()?.trim_end().to_owned(),
-        Command::Config { iceoryx2: false } => {
+        Command::Report(args) => report::run(&config, &args)?,
+        Command::Config { iceoryx2: true, .. } => {
+            config.bus()?.iceoryx2_toml()?.trim_end().to_owned()
+        }
+        Command::Config { robot: true, .. } => config.described().trim_end().to_owned(),
+        Command::Config { .. } => {
             // Do not show a configuration that `up` would refuse.
-            config.warehouse()?;
+            config.known_warehouse()?;
             config.documented().trim_end().to_owned()
         }
         // Before any call into the bus, which may not exist.
@@ -284,7 +301,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             ..
         } => {
             patience()?;
-            stop::run(&config)?
+            stop::run(&config, StopCause::Ordered)?
         }
         Command::Drive {
             command,
@@ -303,7 +320,8 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
 }
 
 /// The configuration file, with the flags of every subcommand on top.
-fn configure(global: &GlobalArgs) -> Result<Config> {
+fn configure(cli: &Cli) -> Result<Config> {
+    let global = &cli.global;
     let mut config = Config::load(global.config.as_deref())?;
     if let Some(name) = &global.name {
         config.name.clone_from(name);
@@ -318,19 +336,38 @@ fn configure(global: &GlobalArgs) -> Result<Config> {
         config.log.file.clone_from(&global.log);
     }
     config.log.json |= global.log_json;
+    // A service has it from the `up` that started it, and `up` looks once it knows the body. A
+    // command that stops the robot needs no file.
+    let is_handed = global.config.as_deref() == Some(Path::new("-"));
+    if !is_handed && needs_description(&cli.command) {
+        config.describe()?;
+    }
     config.validate()?;
     Ok(config)
 }
 
+/// Whether a command must know how the robot is built.
+fn needs_description(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Bridge(_)
+            | Command::Logic(_)
+            | Command::Simulate(_)
+            | Command::Config { .. }
+            | Command::Doctor { .. }
+            | Command::Report(_)
+    )
+}
+
 /// Runs the attendant of the `up` that is `parent`.
 fn attend(config: &Config, parent: Option<Parent>, shutdown: &Shutdown) -> Result<()> {
-    let warehouse = match config.station.wanted {
+    let here = match config.station.wanted {
         true => None,
-        false => {
-            let (side, grid, products) = config.warehouse()?.told()?;
-            Some(lager_topics::WarehouseMap::new(side, grid, &products))
-        }
+        false => config.known_warehouse()?,
     };
+    let told = here.map(|warehouse| warehouse.told()).transpose()?;
+    let warehouse =
+        told.map(|(side, grid, products)| lager_topics::WarehouseMap::new(side, grid, &products));
     let attended = AttendantConfig {
         bus: config.bus()?,
         is_real: config.body == Body::Serial,

@@ -66,6 +66,11 @@ impl Load {
         }
     }
 
+    /// How many processes want a core, on average over a minute.
+    pub const fn wanting(&self) -> f64 {
+        self.wanting
+    }
+
     /// How many processes want a core, in percent of the cores.
     pub fn percent(&self) -> u32 {
         (self.wanting * 100.0 / self.cores as f64).round() as u32

@@ -29,7 +29,7 @@ use lager_topics::{
 use serde::Serialize;
 
 use crate::cli::SimulateArgs;
-use crate::config::{self, Config};
+use crate::config::{self, Config, SIMULATED_WAREHOUSE};
 use crate::exit;
 use crate::up::mission;
 
@@ -82,7 +82,8 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
         ));
     }
     let names = if args.warehouse.is_empty() {
-        vec![config.warehouse.clone()]
+        let named = config.warehouse.as_deref();
+        vec![named.unwrap_or(SIMULATED_WAREHOUSE).to_owned()]
     } else {
         args.warehouse.clone()
     };
@@ -202,11 +203,20 @@ impl Whole {
             baud: config.serial.baud,
             ..RobotOptions::default()
         };
+        Self::of(config, warehouse, mission, options)
+    }
+
+    fn of(
+        config: &Config,
+        warehouse: &Warehouse,
+        mission: &[i32],
+        options: RobotOptions,
+    ) -> Result<Self> {
         let bridge = CoreOptions {
             baud: config.serial.baud,
-            raw_line: config.serial.raw_line,
+            raw_line: config.serial.tells_raw_line(),
             original_boards: config.serial.original_boards,
-            arm: config.arm,
+            robot: config.robot(),
         };
         let (side, grid, products) = warehouse.told()?;
         let map = WarehouseMap::new(side, grid, &products);
@@ -494,6 +504,8 @@ impl Whole {
 
 #[cfg(test)]
 mod boards;
+#[cfg(test)]
+mod built;
 #[cfg(test)]
 mod disturbed;
 #[cfg(test)]

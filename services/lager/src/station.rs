@@ -22,7 +22,7 @@ use lager_supervisor::children::adopt;
 use lager_supervisor::console;
 use lager_supervisor::runtime_folder::{GAG, RuntimeFolder};
 use lager_supervisor::state_folder::StateFolder;
-use lager_supervisor::{Parent, Service};
+use lager_supervisor::{Parent, Service, ServiceManager};
 use lager_wake::Shutdown;
 use rustix::process::{Signal, getppid, kill_process};
 
@@ -39,7 +39,7 @@ const NAME: &str = "station";
 /// # Errors
 /// An address, a socket or the warehouse is not available; the sentence says what to do.
 pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<()> {
-    let (server, panel) = match args.parent {
+    let (mut server, panel) = match args.parent {
         Some(parent) => {
             adopt(parent, shutdown)?;
             let mut server = Server::open(supervised(config)?)?;
@@ -71,8 +71,27 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
             .name("panel".into())
             .spawn(run)?;
     }
-    server.run(&shutdown.flag())?;
-    Ok(())
+    // `up` tells the service manager of its own station.
+    let manager = match args.parent {
+        Some(_) => None,
+        None => Some(announce(&mut server)?),
+    };
+    let served = server.run(&shutdown.flag());
+    if let Some(manager) = manager {
+        manager.stopping();
+    }
+    Ok(served?)
+}
+
+/// Tells the service manager that the station is ready, and from then on that it goes on.
+fn announce(server: &mut Server) -> Result<ServiceManager> {
+    let mut manager = ServiceManager::of_this_process()?;
+    manager.ready();
+    let robots = reach::listed(server.address()?, |at| at.to_string());
+    manager.status(&format!("robots connect to {robots}"));
+    let mut fed = manager.clone();
+    server.each_turn(move || fed.goes_on());
+    Ok(manager)
 }
 
 /// The configuration with the warehouse that the station has saved, if a world can be made of it.
@@ -83,7 +102,7 @@ pub fn saved(config: &Config) -> Result<Config> {
     let file = config.station.warehouse.as_ref();
     let file = file.context("the station keeps no warehouse")?;
     let config = Config {
-        warehouse: file.display().to_string(),
+        warehouse: Some(file.display().to_string()),
         ..config.clone()
     };
     config.warehouse()?;
@@ -257,7 +276,7 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
         },
         gag: fits.is_ok().then_some(gag),
         warehouse: config.station.warehouse.clone(),
-        otherwise: Some(goods::configured(config)?),
+        otherwise: goods::configured(config)?,
         queues: config.station.queue.clone(),
         history: match config.station.history {
             true => Some(StateFolder::of_robot(&config.state_root()?, &config.name).history()),
@@ -272,11 +291,11 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
 fn own_warehouse(config: &Config, named: Option<&str>) -> Result<(PathBuf, Option<Warehouse>)> {
     let Some(name) = named else {
         let folder = StateFolder::of_station(&config.state_root()?)?;
-        return Ok((folder.warehouse_of_nobody(), None));
+        return Ok((folder.warehouse(None), None));
     };
     let builtin = Warehouse::builtin(name);
     let path = match builtin {
-        Some(_) => StateFolder::of_station(&config.state_root()?)?.warehouse(name),
+        Some(_) => StateFolder::of_station(&config.state_root()?)?.warehouse(Some(name)),
         None => PathBuf::from(name),
     };
     Ok((path, builtin))

@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use lager_home::Clock;
+use lager_lines::extension::Spelled;
 use lager_operator::{Act, Begun, Driving, For, Ids, Orders, Seen};
 use lager_orders::lease::LATEST_MOVE;
-use lager_orders::{Action, Mode, Moment, Reason};
+use lager_orders::{Action, LeaseMs, Mode, Moment, Reason, Wheels};
 use lager_ports::{Bus, BusConfig, Subscriber};
 use lager_sample::Topic;
 use lager_stop::Stop;
@@ -124,6 +125,7 @@ impl Operator {
             Ok(begun) => begun,
             Err(why) => return Ok(Some(why)),
         };
+        self.note(action);
         let mut heard = None;
         loop {
             for act in orders.acts() {
@@ -170,6 +172,13 @@ impl Operator {
                 bail!("the bridge has fallen silent; nobody knows what came of it");
             }
         }
+    }
+
+    /// Tells people at the station that somebody has ordered this in a terminal. That they may not
+    /// read it changes nothing for the robot.
+    fn note(&self, action: Action) {
+        let words = format!("{} {}", Role::Operator.as_str(), Spelled(&action));
+        let _ = self.bus.home().note_asked(self.bus.unit(), &words);
     }
 
     fn now(&self) -> Moment {
@@ -222,6 +231,9 @@ impl Operator {
             whose,
         );
         self.hands.steer(order)?;
+        if let Some(action) = steering(command) {
+            self.note(action);
+        }
         let mut accepted = false;
         while end.is_none_or(|end| clock.now() < end) {
             let due = driving.due().unwrap_or_default().max(clock.now());
@@ -254,6 +266,15 @@ impl Operator {
         }
         Ok(format!("let go of `{name}`"))
     }
+}
+
+/// A command as an action. A person renews it for as long as it shall last.
+fn steering(command: OperatorCommand) -> Option<Action> {
+    if let OperatorCommand::Arm(step) = command {
+        return Some(Action::Arm(step));
+    }
+    let lease = LeaseMs::new(LeaseMs::MAX)?;
+    Wheels::new(command).map(|wheels| Action::Drive { wheels, lease })
 }
 
 /// Whether logic shows the effect; a request is answered by whoever it is put to.

@@ -42,14 +42,14 @@ pub fn current(config: &Config) -> Result<Option<Stop>> {
     Ok(StopWord::read(&path(config)?)?.and_then(|told| told.stop()))
 }
 
-/// Stops the robot and waits until its wheels stand.
-pub fn run(config: &Config) -> Result<String> {
+/// Stops the robot for this cause and waits until its wheels stand.
+pub fn run(config: &Config, cause: StopCause) -> Result<String> {
     let path = path(config).context(MOVING)?;
     let folder = path.parent().unwrap_or(&path);
     let was_there = folder.exists();
     let start = Instant::now();
     let ordered_ns = Clock::monotonic_ns();
-    let set = || StopWord::set(&path, Role::Operator, StopCause::Ordered).context(MOVING);
+    let set = || StopWord::set(&path, Role::Operator, cause).context(MOVING);
     set()?;
     loop {
         let Some(told) = StopWord::read(&path).context(MOVING)? else {

@@ -5,13 +5,13 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use lager_monitor::{Lacking, Recorded, ToolError, Tools, TopConfig};
+use lager_monitor::{Lacking, Load, Recorded, ToolError, Tools, TopConfig};
 use lager_topics::Role;
 
 use crate::cli::TopArgs;
 use crate::config::Config;
 use crate::time_limit::TimeLimit;
-use crate::{diagnose, exit, topic};
+use crate::{diagnose, exit, overload, topic};
 
 /// How long to measure for the one picture.
 const ONCE: Duration = Duration::from_secs(2);
@@ -40,11 +40,21 @@ pub fn run(config: &Config, args: &TopArgs, patience: &TimeLimit) -> Result<()> 
         filter: args.filter.clone(),
         once: args.once.then_some(measured),
         pack: config.pack(),
+        load,
     });
     match shown.and_then(|()| Ok(out.flush()?)) {
         Err(error) if error.is_closed_output() => Ok(()),
         shown => Ok(shown?),
     }
+}
+
+/// How busy this machine is; nobody wants a core where the kernel does not say.
+fn load() -> Load {
+    let known = overload::Load::now();
+    known.map_or_else(Load::default, |load| Load {
+        minute: load.wanting(),
+        cores: load.cores(),
+    })
 }
 
 /// The same over a recording.

@@ -1,7 +1,6 @@
 //! `lager topic`: joins the bus for the topic tools, and gives them standard input and output.
 
 use std::io::{BufWriter, Write};
-use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use anyhow::{Context, Result, anyhow};
@@ -187,19 +186,4 @@ fn read_on() -> Result<Receiver<Result<Value, String>>> {
     let thread = std::thread::Builder::new().name("input".to_owned());
     thread.spawn(read).context("cannot start a thread")?;
     Ok(from)
-}
-
-/// `lager completions`: on standard output.
-pub fn completions(shell: clap_complete::Shell) -> ExitCode {
-    let mut script = Vec::new();
-    clap_complete::generate(
-        shell,
-        &mut crate::cli::help::command(),
-        "lager",
-        &mut script,
-    );
-    match std::io::stdout().write_all(&script) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(_) => exit::FAILED,
-    }
 }

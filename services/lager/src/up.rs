@@ -34,6 +34,7 @@ use external::External;
 pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let signals = Signals::listen()?;
     apply(&mut config, args)?;
+    config.describe()?;
     config.validate()?;
     let state = StateFolder::of_robot(&config.state_root()?, &config.name);
     let mut notes = choose_warehouse(&mut config, &state)?;
@@ -80,6 +81,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     }
     let mission = ordered(&config, &external, products, args, &mut kept)?;
     notes.extend(kept.sentence());
+    notes.extend(how_it_starts(&config));
 
     stop::at_start(&config)?;
     let terminal = Terminal::new(args.json, traces::are_shown(&config.log))?;
@@ -134,7 +136,8 @@ fn first_line(config: &Config, args: &UpArgs) -> Result<String> {
         Some(_) => "open the panel in a browser, or ",
         None => "",
     };
-    let products = config.warehouse()?.products;
+    let warehouse = config.known_warehouse()?;
+    let products = warehouse.map_or_else(Vec::new, |warehouse| warehouse.products);
     // The first one is fetched already where nobody says otherwise.
     let fetch = products.get(1).or(products.first());
     let fetch = fetch.map(|product| format!("`{lager} fetch {}`, ", product.id));
@@ -142,6 +145,26 @@ fn first_line(config: &Config, args: &UpArgs) -> Result<String> {
         "Ctrl-C ends the robot; {panel}try in a second terminal: `{lager} top`, {}`{lager} stop`, `lager --help`",
         fetch.unwrap_or_default()
     ))
+}
+
+/// How real boards begin without a shell.
+fn how_it_starts(config: &Config) -> Vec<String> {
+    let mut notes = Vec::new();
+    if config.body != Body::Serial {
+        return notes;
+    }
+    if config.warehouse_name().is_none() {
+        notes
+            .push("the robot waits for a warehouse: set one up at the panel, which is kept".into());
+    }
+    let buttons = config.buttons.lines();
+    if buttons.is_some_and(|buttons| buttons.reset.is_some() && buttons.reset_starts) {
+        notes.push(
+            "real boards start stopped: put the robot on the delivery node, looking into the warehouse, and press reset"
+                .into(),
+        );
+    }
+    notes
 }
 
 /// Removes from the state folder what the next `up` does not need.
@@ -154,16 +177,17 @@ impl Drop for Tidy<'_> {
 }
 
 /// Runs the robot in a copy of its warehouse's file, so that a service that starts again finds the
-/// same world. A built-in warehouse needs no copy.
+/// same world. A built-in warehouse needs no copy, and neither does one that is not there yet.
 fn run_in_copy(config: &mut Config, state: &StateFolder) -> Result<Option<WarehouseCopy>> {
-    if Warehouse::builtin(&config.warehouse).is_some() {
+    let name = config.warehouse_name();
+    if name.is_none_or(|name| Warehouse::builtin(name).is_some()) {
         return Ok(None);
     }
     let copy = WarehouseCopy {
         folder: state.clone(),
         text: toml::to_string(&config.warehouse()?)?,
     };
-    config.warehouse = copy.write()?.display().to_string();
+    config.warehouse = Some(copy.write()?.display().to_string());
     Ok(Some(copy))
 }
 
@@ -194,21 +218,22 @@ fn renewal(
 
 /// Chooses the warehouse, and where its changes are kept. Returns what people should know of it.
 fn choose_warehouse(config: &mut Config, state: &StateFolder) -> Result<Vec<String>> {
-    let name = config.warehouse.clone();
-    let is_builtin = Warehouse::builtin(&name).is_some();
+    let name = config.warehouse_name().map(str::to_owned);
+    let file = name
+        .as_deref()
+        .filter(|name| Warehouse::builtin(name).is_none());
     let keeps = &mut config.station.warehouse;
-    if keeps.is_none() {
-        *keeps = Some(match is_builtin {
-            true => state.warehouse(&name),
-            false => std::path::absolute(&name)?,
-        });
-    }
-    if !is_builtin {
+    if let Some(file) = file {
+        if keeps.is_none() {
+            *keeps = Some(std::path::absolute(file)?);
+        }
         return Ok(Vec::new());
     }
-    let (saved, note) = state.saved(&name, |file| config::warehouse(file).map(drop));
+    let builtin = name.as_deref();
+    keeps.get_or_insert_with(|| state.warehouse(builtin));
+    let (saved, note) = state.saved(builtin, |file| config::warehouse(file).map(drop));
     if let Some(saved) = saved {
-        config.warehouse = saved;
+        config.warehouse = Some(saved);
     }
     Ok(note.into_iter().collect())
 }
@@ -216,12 +241,11 @@ fn choose_warehouse(config: &mut Config, state: &StateFolder) -> Result<Vec<Stri
 /// The orders with which the robot starts, if `up` gives any. Real boards do not move off by
 /// themselves: a person must ask for it with two flags.
 fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
-    let warehouse = config.warehouse()?;
     if config.station.wanted && config.station.address.is_some() {
         numbers_only(&args.mission)?;
     }
-    let mission = mission(&warehouse, &args.mission)?;
     let usage = |why: &str| exit::Usage(why.to_owned());
+    let mission = || mission(&config.warehouse()?, &args.mission);
     if config.body != Body::Serial {
         let is_elsewhere = config.station.wanted && config.station.address.is_some();
         // The person who has the station gives orders there.
@@ -230,11 +254,11 @@ fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
                 "--exit-when-done waits for the end of a mission; with the station of somebody else there is one with --mission"
             )),
             (true, false) => Ok(Some(Vec::new())),
-            (false, _) => Ok(Some(mission)),
+            (false, _) => mission().map(Some),
         };
     }
     match (args.script, args.mission.is_empty()) {
-        (true, false) => Ok(Some(mission)),
+        (true, false) => mission().map(Some),
         (true, true) => {
             bail!(usage(
                 "on real boards --script needs --mission: say what it is to fetch"
@@ -261,13 +285,11 @@ fn ordered(
     args: &UpArgs,
     kept: &mut KeptOrders,
 ) -> Result<Mission> {
-    let known: Vec<i32> = config
-        .warehouse()?
-        .products
-        .iter()
-        .map(|it| it.id)
-        .collect();
-    kept.orders.retain(|order| known.contains(&order.product));
+    // Orders for goods that are not there any more go. A robot without a warehouse keeps them all.
+    if let Some(warehouse) = config.known_warehouse()? {
+        let is_known = |id| warehouse.products.iter().any(|product| product.id == id);
+        kept.orders.retain(|order| is_known(order.product));
+    }
     if config.body != Body::Serial {
         // The world of a simulated robot is new.
         kept.gone.clear();
@@ -395,7 +417,7 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
         config.serial.baud = baud;
     }
     if let Some(warehouse) = &args.warehouse {
-        config.warehouse.clone_from(warehouse);
+        config.warehouse = Some(warehouse.clone());
     }
     if let Some(seed) = args.seed {
         config.simulator.seed = seed;

@@ -6,7 +6,7 @@
 
 use lager_topics::NavigatorStatus;
 
-use crate::odometer::STANDARD_DUTY;
+use crate::config::LogicConfig;
 
 /// The bridge's sum, now and when the robot's place was last known, in duty × µs of both motors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,11 +39,11 @@ impl ByHand {
 
     /// Takes the bridge's sum. Returns how far the wheels have moved since the place was known, in
     /// mm. A bridge that has lost its sum has stopped the robot because of that.
-    pub(crate) fn take(&mut self, sum: u64, cruise_mm_per_s: f32) -> f32 {
+    pub(crate) fn take(&mut self, sum: u64, config: &LogicConfig) -> f32 {
         self.now = sum;
         let here = *self.here.get_or_insert(sum);
         let turned = sum.saturating_sub(here) as f32;
-        turned / 2.0 / STANDARD_DUTY * cruise_mm_per_s / 1e6
+        turned / 2.0 / f32::from(config.duty) * config.cruise_mm_per_s / 1e6
     }
 }
 
@@ -59,18 +59,18 @@ mod tests {
     #[test]
     fn what_was_driven_before_the_first_look_is_nobodys() {
         let mut by_hand = ByHand::default();
-        assert_eq!(by_hand.take(both(90_000), 73.3), 0.0);
-        assert!((by_hand.take(both(91_000), 73.3) - 73.3).abs() < 0.01);
+        assert_eq!(by_hand.take(both(90_000), &LogicConfig::default()), 0.0);
+        assert!((by_hand.take(both(91_000), &LogicConfig::default()) - 73.3).abs() < 0.01);
         by_hand.stand_here();
-        assert_eq!(by_hand.take(both(91_000), 73.3), 0.0);
+        assert_eq!(by_hand.take(both(91_000), &LogicConfig::default()), 0.0);
     }
 
     #[test]
     fn a_successor_finds_out_what_was_driven_while_nobody_looked() {
         let mut by_hand = ByHand::default();
-        by_hand.take(both(500), 73.3);
+        by_hand.take(both(500), &LogicConfig::default());
         let mut successor = ByHand::from_status(by_hand.to_status());
-        assert!((successor.take(both(1_500), 73.3) - 73.3).abs() < 0.01);
+        assert!((successor.take(both(1_500), &LogicConfig::default()) - 73.3).abs() < 0.01);
         let fresh = ByHand::from_status(ByHand::default().to_status());
         assert_eq!(fresh, ByHand::default());
     }

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use lager_orders::Pick;
 use lager_wake::Policy;
-use lager_wire::ArmProfile;
+use lager_wire::{ArmProfile, WheelsProfile};
 use serde::{Deserialize, Serialize};
 
 /// The robot's measures, and the navigator's tolerances. Times are robot time.
@@ -13,7 +13,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogicConfig {
-    /// Speed in mm/s with both motors at the standard duty of 100 (W3).
+    /// Duty at which the boards drive straight on and turn (W1, `PWM_STANDARD`), of 255. Recordings
+    /// without it are of robots with 100.
+    #[serde(default = "usual_duty")]
+    pub duty: u8,
+    /// Speed in mm/s with both motors at that duty (W3).
     pub cruise_mm_per_s: f32,
     /// Speed of turning on the spot in degrees/s at that duty: 360 degrees in 12 s (W4).
     pub turn_deg_per_s: f32,
@@ -129,9 +133,14 @@ impl LogicConfig {
     }
 }
 
+fn usual_duty() -> u8 {
+    WheelsProfile::default().duty
+}
+
 impl Default for LogicConfig {
     fn default() -> Self {
         Self {
+            duty: usual_duty(),
             cruise_mm_per_s: 73.3,
             turn_deg_per_s: 30.0,
             sensor_ahead_mm: 160.0,

@@ -14,9 +14,6 @@ use lager_wire::{COMMAND_AGE, Command, SteerFlags, WheelCommand};
 
 use crate::config::LogicConfig;
 
-/// Duty at which the configured speeds hold (PWM_STANDARD).
-pub(crate) const STANDARD_DUTY: f32 = 100.0;
-
 /// If two marks are nearer than this, in mm, the odometer learns nothing between them: a mark's own
 /// position is not exact enough.
 const LEAST_LESSON_MM: f32 = 150.0;
@@ -57,7 +54,7 @@ impl Odometer {
     /// Takes the duties of a report that has just come.
     pub fn report(&mut self, now: Duration, report: &SteeringReport, config: &LogicConfig) {
         self.advance(now);
-        let (left, right) = speeds(report);
+        let (left, right) = speeds(report, config.duty);
         let (left, right) = (left * (1.0 + self.faster), right * (1.0 + self.faster));
         // In a turn on the spot the board makes both sides turn alike. So different duties then
         // show how much the motors differ, not that the axle moves.
@@ -87,7 +84,7 @@ impl Odometer {
 }
 
 /// Speed of both wheels, as a part of the speed at the standard duty.
-fn speeds(report: &SteeringReport) -> (f32, f32) {
+fn speeds(report: &SteeringReport, standard: u8) -> (f32, f32) {
     let flags = SteerFlags(report.flags);
     // A board of ours locks its arm while the wheels move. A report without flags is that of an
     // original board, which reports nothing: the bridge fills in the command that it was sent, and
@@ -96,7 +93,7 @@ fn speeds(report: &SteeringReport) -> (f32, f32) {
         return nominal(report.code);
     }
     let share = |duty: u8, reverse: SteerFlags| {
-        let share = f32::from(duty) / STANDARD_DUTY;
+        let share = f32::from(duty) / f32::from(standard);
         if flags.contains(reverse) {
             -share
         } else {

@@ -39,7 +39,7 @@ pub use echo::EchoConfig;
 pub use measure::Limits;
 pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
-pub use top::{Lacking, Recorded, TopConfig, leave_screen};
+pub use top::{Lacking, Load, Recorded, TopConfig, leave_screen};
 
 /// How often `topic echo` and `top` look.
 const POLL: Duration = Duration::from_millis(5);

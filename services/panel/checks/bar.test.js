@@ -103,6 +103,8 @@ test("one that needs a person says what would help", () => {
 
 test("by hand, waiting and driving are told apart", () => {
   assert.equal(look(robot({ mode: "manual" })).look, "hand");
+  // What logic would do it does not do.
+  assert.equal(look(robot({ mode: "manual", phase: "driving", next: "2,1", product: "7" })).said, "driven by hand, was to fetch 7");
   assert.equal(look(robot()).look, "waits");
   assert.equal(look(robot({ phase: "picking", failure: "not_felt" })).look, "waits");
   const shown = look(robot({ phase: "driving", next: "2,1", product: "7" }));

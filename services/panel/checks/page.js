@@ -2,6 +2,9 @@
 
 import { register } from "node:module";
 
-register("./table.js", import.meta.url);
-globalThis.document = { documentElement: { dataset: { language: "en" } } };
+register("./made.js", import.meta.url);
+globalThis.document = { documentElement: { dataset: { language: "en" } }, baseURI: new URL("../page/", import.meta.url).href };
 globalThis.location = { search: "" };
+
+const { speak } = await import("../page/words/words.js");
+await speak();

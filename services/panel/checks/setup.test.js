@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Edits, delivered, moved, named, placed, removed, resized, wrongFloor, wrongGoods } from "../page/setup/edits.js";
 import { readFile, readGoods, readMap, wrongDrawing } from "../page/setup/written.js";
-import { LIMITS } from "../page/words/table.js";
+import { LIMITS } from "../page/setup/limits.js";
 
 const HALL = { size: [2, 2], side_length_cm: 50, delivery: [2, 0], product: [{ id: 7, square: [1, 1], side: "right" }] };
 /** Edits of the hall that the station keeps. */

@@ -1,47 +1,51 @@
 // Words and sentences, in both languages.
 
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { afterEach, test } from "node:test";
+import { runInNewContext } from "node:vm";
 import { called, crossing, failure, reason, sentence, thought } from "../page/words/sentences.js";
-import { current, decimal, say, span } from "../page/words/words.js";
-import { TABLE } from "../page/words/table.js";
+import { decimal, open, names, say, span, speak } from "../page/words/words.js";
 
-const { dataset } = document.documentElement;
-const inSwedish = (act) => {
-  dataset.language = "sv";
+const inSwedish = async (act) => {
+  await speak("sv");
   return act();
 };
-afterEach(() => (dataset.language = "en"));
+afterEach(() => speak("en"));
 
-test("a word has its values filled in, in the language in use", () => {
+test("a word has its values filled in, in the language in use", async () => {
   assert.equal(say("fetches", 7), "fetches 7");
-  assert.equal(inSwedish(() => say("fetches", 7)), "hämtar 7");
-  dataset.language = "en";
+  assert.equal(await inSwedish(() => say("fetches", 7)), "hämtar 7");
+  await speak("en");
   assert.equal(say("side_limits", 20, 5, 100), "the robot drives in squares of 20 to 100 cm; these are 5 cm");
   assert.equal(say("fetches"), "fetches ");
 });
 
 test("a sentence of the table is a word, too, and what stands nowhere is shown as it is", () => {
-  assert.equal(say("late", 3), TABLE.late.en);
+  assert.equal(say("late", 3), open("late"));
   assert.equal(say("no such word"), "no such word");
   assert.equal(sentence("no such word"), null);
   assert.equal(sentence("late_answer", { text: "stop", ms: 0 }), "stop: came 0 ms late; give it anew");
 });
 
-test("the language is the one chosen before, or else the browser's", () => {
+test("the language is the one chosen before, or else the browser's, and its words are fetched at once", () => {
+  const early = readFileSync(new URL("../page/early.js", import.meta.url), "utf8");
   const languages = [[null, "sv-SE", "sv"], [null, "en-GB", "en"], [null, "de", "en"], ["sv", "en-GB", "sv"], ["en", "sv-SE", "en"]];
   for (const [kept, language, expected] of languages) {
-    delete dataset.language;
-    globalThis.localStorage = { getItem: () => kept };
-    Object.defineProperty(globalThis, "navigator", { value: { language }, configurable: true });
-    assert.equal(current(), expected, `${kept} ${language}`);
-    assert.equal(document.documentElement.lang, expected);
+    const [root, fetched] = [{ dataset: {} }, []];
+    runInNewContext(early, {
+      addEventListener() {},
+      document: { documentElement: root, createElement: () => ({}), head: { append: (link) => fetched.push(link.href) } },
+      localStorage: { getItem: (key) => (key === "language" ? kept : null) },
+      navigator: { language },
+    });
+    assert.deepEqual([root.lang, root.dataset.language, ...fetched], [expected, expected, `words/${expected}.js`], `${kept} ${language}`);
   }
 });
 
-test("numbers and times are written as the language does", () => {
+test("numbers and times are written as the language does", async () => {
   assert.deepEqual([0, -2, 999.4, 1_000, 59_940, 60_000, 3_599_999, 7_200_000].map(span), ["0 ms", "0 ms", "999 ms", "1.0 s", "59.9 s", "1 min", "59 min", "2 h"]);
-  assert.equal(inSwedish(() => decimal(11.74)), "11,7");
+  assert.equal(await inSwedish(() => decimal(11.74)), "11,7");
 });
 
 test("a reason has its values in the order of the English sentence, and the last one is the rest", () => {
@@ -51,13 +55,15 @@ test("a reason has its values in the order of the English sentence, and the last
   assert.equal(reason("something that nobody knows"), "something that nobody knows");
 });
 
-test("every sentence has the same values in both languages, and as a reason none is left open", () => {
-  const values = (text) => [...new Set(text.match(/\{\w+\}/g))].sort();
-  for (const [name, { en, sv }] of Object.entries(TABLE)) {
-    assert.deepEqual(values(sv), values(en), name);
-    for (const language of ["en", "sv"]) {
-      dataset.language = language;
-      const told = reason([name, ...values(en).map((_, at) => `v${at}`)].join(" "));
+test("every sentence has the same values in the same order in both languages, and as a reason none is left open", async () => {
+  const values = (text) => [...new Set(text.match(/\{\w+\}/g))];
+  const english = Object.fromEntries(names().map((name) => [name, values(open(name))]));
+  assert.ok(names().length > 300);
+  for (const language of ["en", "sv"]) {
+    await speak(language);
+    assert.deepEqual(Object.fromEntries(names().map((name) => [name, values(open(name))])), english);
+    for (const name of names()) {
+      const told = reason([name, ...english[name].map((_, at) => `v${at}`)].join(" "));
       assert.doesNotMatch(told, /[{}]|undefined|null/, name);
     }
   }
@@ -65,9 +71,9 @@ test("every sentence has the same values in both languages, and as a reason none
 
 test("a page is called by a name, as oneself, or as a guest", () => {
   assert.equal(called("eva"), "eva");
-  assert.equal(called("eva", "eva"), TABLE.called_you.en);
+  assert.equal(called("eva", "eva"), open("called_you"));
   assert.match(called("panel-12"), /12/);
-  assert.equal(called("panel"), TABLE.called_form.en);
+  assert.equal(called("panel"), open("called_form"));
 });
 
 test("what is wrong and what is thought have their place and their goods in them", () => {

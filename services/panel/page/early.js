@@ -1,4 +1,4 @@
-// What must be there before the page's script runs: STOP's keys and the theme. STOP is a form, so a click needs no
+// What must be there before the page's script runs: STOP's keys, the theme and the language. STOP is a form, so a click needs no
 // script at all.
 
 addEventListener("keydown", (event) => {
@@ -26,3 +26,15 @@ function useTheme() {
 }
 useTheme();
 addEventListener("storage", useTheme);
+
+// The language that was chosen (`words.js`), or else the browser's; English if the page does not know it. Its words come
+// while the page's script is on its way.
+{
+  const root = document.documentElement;
+  const language = (localStorage.getItem("language") ?? navigator.language).startsWith("sv") ? "sv" : "en";
+  root.lang = root.dataset.language = language;
+  const words = document.createElement("link");
+  words.rel = "modulepreload";
+  words.href = `words/${language}.js`;
+  document.head.append(words);
+}

@@ -8,13 +8,11 @@ import { at, every } from "./parts/at.js";
 import { Bar } from "./bar/bar.js";
 import { choose, named, shown } from "./station/chosen.js";
 import { Driving } from "./drive/drive.js";
-import { Health } from "./health/health.js";
 import { Help } from "./help/help.js";
 import { nameTheme, switchesTheme } from "./help/theme.js";
 import { Fleet } from "./fleet/fleet.js";
 import { ByHand } from "./drive/hand.js";
-import { Line } from "./line/line.js";
-import { Later } from "./signals/later.js";
+import { Later } from "./parts/later.js";
 import { Link } from "./station/link.js";
 import { Log } from "./log/log.js";
 import { WarehouseMap } from "./map/map.js";
@@ -24,21 +22,17 @@ import { Moment } from "./time/moment.js";
 import { Notify } from "./bar/notify.js";
 import { obstacles } from "./map/obstacle.js";
 import { offers } from "./map/offers.js";
-import { OnMap } from "./setup/onmap.js";
 import { drawRemedy } from "./bar/remedy.js";
-import { Rename } from "./setup/rename.js";
 import { Save } from "./log/save.js";
 import { Stack } from "./map/stack.js";
-import { Setup } from "./setup/setup.js";
 import { Strips } from "./signals/strips.js";
 import { TimeLine } from "./time/line.js";
-import { Uses } from "./setup/uses.js";
 import { Wheel } from "./drive/wheel.js";
-import { change, current, put, say, translate } from "./words/words.js";
+import { change, put, say, speak, translate } from "./words/words.js";
 
 const now = () => performance.now();
 
-current();
+await speak();
 translate();
 const link = new Link();
 const robot = () => shown(link);
@@ -63,8 +57,8 @@ const offered = (of) => offers({
   link, now, obstacle: meetWay, isPlaceWanted: () => where.isWanted(robot()), stands: (crossing) => where.choose(crossing),
   choose: (goods, at) => stack.open(goods, at, map.pixels(at), map.size),
   fetch: (product, hand = { beside: at("map-undo"), said: at("map-said") }) => missions.fetch(product, hand),
-  edited: () => setup.edits.now,
-  setUp: (target) => rename.offers(target),
+  edited: () => editor.made?.now ?? null,
+  setUp: (target) => editor.made?.offers(target) ?? null,
   ...of,
 });
 const tellOnMap = (words = "") => put(at("map-said"), words);
@@ -73,7 +67,7 @@ const map = new WarehouseMap(at("map"), {
   words: at("map-text"), scaleBar: at("map-scale"), legend: at("map-legend"), over: [at("asked"), at("moment")], tell: tellOnMap,
   tools: { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") },
   hand: {
-    tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: isSetUp, grip: (target) => (isSetUp() ? onMap.grip(target) : null),
+    tip: at("map-tip"), isArmed: () => at("armed").checked, isPlacing: isSetUp, grip: (target) => (isSetUp() && editor.made?.grip(target)) || null,
     offers: mapOffers,
   },
 });
@@ -91,46 +85,46 @@ const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("
 const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
 const wheel = new Wheel(link, { button: at("control"), name: at("name") }, robot, driving, where);
 const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: at("hand-over"), keep: at("keep") }, robot, () => driving.letGo());
-const setup = new Setup(link, {
-  form: at("warehouse"), products: at("products"), add: at("add-product"), said: at("setup-said"), floor: at("floor-size"),
-  undo: at("undo"), redo: at("redo"), undoes: at("undo-what"), unsaved: at("unsaved"), discard: at("discard"),
-  saveFile: at("save-file"), loadFile: at("load-file"), mapString: at("map-string"), goodsString: at("goods-string"),
-}, { drawn: drawWarehouse, isOpen: isSetUp });
-const onMap = new OnMap(map, { edits: setup.edits, changed: () => setup.fill(), mayEdit: () => link.mayDrive });
-const rename = new Rename(map, {
-  form: at("rename"), number: at("rename-number"), name: at("rename-name"), move: at("rename-move"), remove: at("rename-remove"), close: at("rename-close"),
-}, onMap);
-map.scaledAnew = () => onMap.draw(isSetUp());
-const uses = new Uses(link, {
-  where: at("kept-where"), robots: at("kept-robots"), ask: at("renew"), box: at("renew-box"), question: at("renew-question"), yes: at("renew-yes"), no: at("renew-no"), said: at("renew-said"),
-}, robot);
-const line = new Line({
-  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), said: at("board-said"),
-  calibrate: at("calibrate"), steps: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"),
-}, link, robot);
+const editor = new Later(
+  at("setup"),
+  (query) => (query ? import(`./setup/editor.js${query}`) : import("./setup/editor.js")),
+  ({ Editor }) => new Editor(link, { map, robot, isOpen: isSetUp, drawn: drawWarehouse }),
+);
+const line = new Later(
+  at("line"),
+  (query) => (query ? import(`./line/line.js${query}`) : import("./line/line.js")),
+  ({ Line }) => new Line({
+    gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), said: at("board-said"),
+    calibrate: at("calibrate"), steps: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"),
+  }, link, robot),
+);
 const fleet = new Fleet(link, { tab: at("tab-fleet"), list: at("fleet-list") }, (name) => {
   at("robot").value = name;
   at("robot").dispatchEvent(new Event("change"));
 });
 const signals = new Later(
-  { view: at("signals"), said: at("signals-state"), again: at("signals-again") },
-  () => at("armed").checked,
-  link,
+  at("signals"),
   (query) => (query ? import(`./signals/signals.js${query}`) : import("./signals/signals.js")),
+  ({ Signals }) => new Signals(at("signals"), () => at("armed").checked, link),
 );
+const coming = { said: at("coming-said"), again: at("coming-again") };
 const strips = new Strips(at("strips"), (lane) => {
   show(at("tab-signals"));
-  signals.show(lane);
+  signals.once((made) => made.show(lane));
 });
 const notify = new Notify(link, at("notify"));
 const log = new Log({ panel: at("log"), map: at("map-zone"), filter: at("filter"), kinds: at("log-kinds"), entries: at("entries"), earlier: at("log-earlier"), said: at("log-said") }, { kept, moment, robot });
-const save = new Save({ span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot, () => moment.at ?? link.now());
+const save = new Save({ span: at("save-span"), csv: at("save-csv"), mcap: at("save-mcap"), said: at("log-said") }, robot, () => moment.at ?? link.now(), (query) => (query ? import(`./log/recording.js${query}`) : import("./log/recording.js")));
 const timeLine = new TimeLine(link, {
   line: at("time"), slider: at("time-line"), choice: at("time-span"), from: at("time-from"), before: at("time-before"), after: at("time-after"), now: at("time-now"), tag: at("moment"),
 }, { kept, moment, robot });
-const health = new Health(link, {
-  body: at("health"), said: at("health-said"), links: at("health-links"), services: at("health-services"), machine: at("health-machine"), losses: at("health-losses"), versions: at("health-versions"),
-});
+const health = new Later(
+  at("health"),
+  (query) => (query ? import(`./health/health.js${query}`) : import("./health/health.js")),
+  ({ Health }) => new Health(link, {
+    body: at("health"), said: at("health-said"), links: at("health-links"), services: at("health-services"), machine: at("health-machine"), losses: at("health-losses"), versions: at("health-versions"),
+  }),
+);
 const help = new Help({ dialog: at("help"), body: at("help-body"), open: at("help-open"), close: at("help-close"), legend: at("map-legend") }, () => at("armed").checked);
 switchesTheme(at("theme"));
 
@@ -141,7 +135,7 @@ function isSetUp() {
 
 /** Draws the warehouse that is kept or, while it is set up, the one that it would become. */
 function drawWarehouse() {
-  const warehouse = isSetUp() ? setup.edits.now : link.warehouse;
+  const warehouse = isSetUp() && editor.made ? editor.made.now : link.warehouse;
   at("map-zone").classList.toggle("empty", !warehouse);
   map.setWarehouse(warehouse);
 }
@@ -167,8 +161,12 @@ at("autonomous").onclick = () => {
 };
 at("where-ask").onclick = () => link.warehouse && where.ask();
 at("reload").onclick = () => location.reload();
-at("language").onclick = () => {
-  change();
+at("language").onclick = async () => {
+  try {
+    await change();
+  } catch {
+    return tellOnMap(say("view_failed"));
+  }
   translate();
   words();
   map.redraw();
@@ -207,7 +205,7 @@ function show(tab) {
   // Who drives or sets up sees what is now.
   if (tab.id === "tab-drive" || isSetUp()) moment.back();
   if (wasSetUp === isSetUp()) return;
-  rename.close();
+  editor.made?.close();
   drawWarehouse();
   map.fit();
 }
@@ -218,7 +216,7 @@ function words() {
   for (const element of every(".driver-only", HTMLElement)) element.toggleAttribute("disabled", !link.mayDrive);
   nameTheme(at("theme"));
   if (help.dialog.open) help.write();
-  setup.draw();
+  editor.made?.words();
 }
 
 link.addEventListener("robots", () => {
@@ -235,7 +233,6 @@ at("robot").onchange = () => {
   byHand.leave();
 };
 link.addEventListener("warehouse", () => {
-  setup.kept(link.warehouse);
   drawWarehouse();
   missions.setWarehouse(link.warehouse);
 });
@@ -244,15 +241,20 @@ words();
 
 /** All that is not moved is drawn five times a second, and all else while nothing moves. */
 const REST_MS = 200;
-/**
- * What part of a core pictures may take. Each new pose is drawn at once, twenty times a second. As many
- * more as this allows, up to all of the screen's, let robot and strips move smoothly: on a machine that
- * paints in a fraction of a millisecond all of them.
- */
-const SHARE = 0.04;
+/** So often where only figures change. */
+const FIGURES_MS = 600;
+/** What somebody does, and what has happened, may go on changing things for so long. */
+const AFTER_MS = 2_000;
+/** When something has happened last, or somebody has done something here. */
+let news = now();
+/** What part of a core pictures may take while something moves: a quick machine draws all of the screen's. */
+const SHARE = 0.025;
+/** A slow machine draws half of the twenty poses a second, but so many that the robot still glides (`GLIDE_MS`). */
+const GLIDES_MS = 90;
 /** So long a picture has taken lately, in ms, all the browser's work for it included. */
 let cost = 5;
 let drawn = -Infinity;
+let pictured = -Infinity;
 /** @type {number | null} */
 let due = null;
 let timer = 0;
@@ -262,6 +264,22 @@ function moves() {
   const { left_duty: left = 0, right_duty: right = 0 } = robot()?.state ?? {};
   return at("armed").checked || moment.isPast || Number(left) !== 0 || Number(right) !== 0;
 }
+
+/** Whether only figures change, and not those of a view that is about them. Silence is no figure. */
+const isQuiet = () => now() - news > AFTER_MS && now() - (robot()?.heard ?? 0) < REST_MS && signals.view.hidden && line.view.hidden;
+
+/** Something has happened, or somebody has done something here. */
+function hear() {
+  news = now();
+  if (moves()) return;
+  clearTimeout(timer);
+  timer = setTimeout(soon, pictured + REST_MS - news);
+}
+for (const event of ["link", "news", "robots", "warehouse"]) link.addEventListener(event, hear);
+for (const event of ["pointerdown", "pointerup", "pointermove", "wheel", "keydown", "input", "change", "hashchange"]) addEventListener(event, hear, { capture: true, passive: true });
+
+/** So long after a picture comes the next one while something moves, in ms. */
+const pauses = () => Math.min(cost / SHARE, GLIDES_MS);
 
 /** Draws in the browser's next picture. */
 function soon() {
@@ -277,8 +295,9 @@ function picture() {
   due = null;
   const time = now();
   painted.port2.postMessage(time);
-  const pause = cost / SHARE;
-  timer = setTimeout(soon, moves() ? Math.min(pause, REST_MS) : REST_MS);
+  const pause = pauses();
+  pictured = time;
+  timer = setTimeout(soon, moves() ? pause : isQuiet() ? FIGURES_MS : REST_MS);
   const isSmooth = pause < 34;
   const shown = robot();
   driving.pads();
@@ -312,16 +331,17 @@ function drawRest(shown, time, seen, then) {
   driving.draw();
   strips.draw(seen, then);
   timeLine.draw(shown);
-  signals.draw(shown, time);
-  line.draw(shown);
-  if (isSetUp()) uses.draw();
+  at("coming").toggleAttribute("hidden", ![signals, editor, line, health].some(({ view, state }) => !view.hidden && state));
+  signals.open(coming)?.draw(shown, time);
+  editor.open(coming)?.draw();
+  line.open(coming)?.draw(shown);
   asked.draw(shown);
   byHand.draw(shown);
   log.draw(shown);
   save.draw(shown);
   notify.draw(time);
   wheel.draw(shown);
-  health.draw(shown, time);
+  health.open(coming)?.draw(shown, time);
   if (!map.warehouse) put(at("map-said"), say("no_map"));
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
@@ -334,5 +354,5 @@ function drawRest(shown, time, seen, then) {
  */
 const asNow = (live) => Object.create(live, { name: { value: say("time_now") }, isStale: { value: () => true } });
 
-link.addEventListener("pose", () => moves() && soon());
+link.addEventListener("pose", () => moves() && now() - pictured >= pauses() && soon());
 soon();

@@ -7,9 +7,9 @@ import { battery } from "./bar/battery.js";
 import { face, show } from "./bar/face.js";
 import { Link } from "./station/link.js";
 import { Stop } from "./bar/stop.js";
-import { current, put, say } from "./words/words.js";
+import { put, say, speak } from "./words/words.js";
 
-current();
+await speak();
 const link = new Link();
 const robot = () => shown(link);
 const name = () => robot()?.name ?? named();

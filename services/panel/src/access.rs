@@ -129,13 +129,15 @@ pub(crate) fn said<'f>(form: &'f str, field: &str) -> Option<&'f str> {
 }
 
 /// The name that a person has chosen, as the page says it: letters, digits and `-`, in UTF-8 with the
-/// escapes of an address. `None`: none, or one that could be taken for a guest's or for nobody's.
+/// escapes of an address. `None`: none, or one that could be taken for a guest's, for a
+/// part's of the robot, or for nobody's.
 pub(crate) fn person(name: &str) -> Option<String> {
     let name = percent_decode_str(name).decode_utf8().ok()?;
     let is_fit = name.chars().all(|one| one.is_alphanumeric() || one == '-')
         && name.chars().any(char::is_alphabetic)
         && name.chars().count() <= 24;
-    let is_taken = name.starts_with("panel") || ["you", "nobody", "comm"].contains(&&*name);
+    let is_taken =
+        name.starts_with("panel") || ["you", "nobody", "comm", "operator"].contains(&&*name);
     (is_fit && !is_taken).then(|| name.into_owned())
 }
 
@@ -223,7 +225,7 @@ mod tests {
     fn a_person_has_a_name_of_letters_and_nobody_elses() {
         assert_eq!(person("Anna").as_deref(), Some("Anna"));
         assert_eq!(person("%C3%85sa-2").as_deref(), Some("Åsa-2"));
-        for none in ["", "panel-3", "-", "a%20b", "a%0Ab"] {
+        for none in ["", "panel-3", "operator", "-", "a%20b", "a%0Ab"] {
             assert_eq!(person(none), None, "{none}");
         }
         for broken in ["%", "%4", "%zz", "%C3", "a=b", "%E2%80%AE"] {

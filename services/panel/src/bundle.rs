@@ -12,8 +12,9 @@
 //!
 //! An `import` stands in one line and names the things that it imports. An `export` stands before
 //! its `const`, `function` or `class`. The page's modules use no other form, and a test checks
-//! that. Indentation and comments that have lines of their own are left out, but not from what others
-//! have written (`vendor/`): their licence stands there.
+//! that. A module may wait: an `await` outside its functions begins a line. Indentation, empty lines and
+//! comments that have lines of their own are left out, but not from what others have written
+//! (`vendor/`): their licence stands there.
 //!
 //! What the page needs later is a script of its own, which shares the modules of the first one:
 //!
@@ -100,6 +101,7 @@ impl Bundle {
         let mut body = String::new();
         let mut exports = Vec::new();
         let mut is_comment = false;
+        let waits = text.lines().any(|line| line.starts_with("await "));
         for line in text.lines() {
             let begins = line.trim_start();
             if is_comment || (is_ours && begins.starts_with("/**")) {
@@ -112,16 +114,21 @@ impl Bundle {
                 exports.extend(exported(rest));
                 body.push_str(rest);
                 body.push('\n');
-            } else if !(is_ours && begins.starts_with("//")) {
+            } else if !(is_ours && (begins.is_empty() || begins.starts_with("//"))) {
                 body.push_str(if is_ours { begins } else { line });
                 body.push('\n');
             }
         }
         let exports = exports.join(", ");
         let constant = constant(name);
+        let (before, begins) = if waits {
+            ("await ", "async ")
+        } else {
+            ("", "")
+        };
         let _ = write!(
             self.script,
-            "const {constant} = (() => {{\n{body}return {{ {exports} }};\n}})();\n"
+            "const {constant} = {before}({begins}() => {{\n{body}return {{ {exports} }};\n}})();\n"
         );
         exports
     }
@@ -166,11 +173,11 @@ mod tests {
     #[test]
     fn modules_become_one_script_each_once_and_before_who_needs_it() {
         let source = |name: &str| match name {
-            "main.js" => {
-                Some("import { b } from \"./in/b.js\";\nimport { c, d } from \"./c.js\";\nb(c);\n")
-            }
+            "main.js" => Some(
+                "import { b } from \"./in/b.js\";\nimport { c, d } from \"./c.js\";\nawait b(c);\n",
+            ),
             "in/b.js" => Some(
-                "// What b is.\n/** Of one line. */\n  /**\n   * Of more.\n   */\nimport { c } from \"../c.js\";\nexport function b(x) {\n  return x + c;\n}\n",
+                "// What b is.\n\n/** Of one line. */\n  /**\n   * Of more.\n   */\nimport { c } from \"../c.js\";\nexport function b(x) {\n  return x + c;\n}\n",
             ),
             "c.js" => Some("export const c = 1;\nexport class d {}\nconst hidden = 2;\n"),
             _ => None,
@@ -179,7 +186,7 @@ mod tests {
             bundle("main.js", source).script,
             "const $c = (() => {\nconst c = 1;\nclass d {}\nconst hidden = 2;\nreturn { c, d };\n})();\n\
              const $in_b = (() => {\nconst { c } = $c;\nfunction b(x) {\nreturn x + c;\n}\nreturn { b };\n})();\n\
-             const $main = (() => {\nconst { b } = $in_b;\nconst { c, d } = $c;\nb(c);\nreturn {  };\n})();\n\
+             const $main = await (async () => {\nconst { b } = $in_b;\nconst { c, d } = $c;\nawait b(c);\nreturn {  };\n})();\n\
              export { $c, $in_b, $main };\n"
         );
     }

@@ -9,7 +9,8 @@
 //!   GET /history/moment?robot=r1&at=<ms>                         likewise, the last of each report
 //! ```
 //!
-//! Times are in ms since 1970. Without `until` a time ends now, and without `since` it begins ten
+//! Times are in ms since 1970; in the table in s, as a number, because a program reads that in every
+//! language and zone. Without `until` a time ends now, and without `since` it begins ten
 //! minutes before its end. `<line>` is a line of the station's extension, `thought <text>` or
 //! `asked <name> <what>`, as in [`speech`](crate::speech). With `most` only the newest events are
 //! told, and with `only` those of these kinds; `lines` tells at most one state in [`APART_MS`].

@@ -35,18 +35,27 @@ pub(crate) const HEADERS: &[(&str, &str)] = &[
     ("cache-control", "no-cache"),
 ];
 
-/// The scripts that the pages run, with all their modules; what a page fetches when it needs it is
-/// a script of its own.
-static BUNDLES: LazyLock<[(&str, Bundle); 3]> = LazyLock::new(|| {
+/// The scripts that the pages run, with all their modules.
+static BUNDLES: LazyLock<Vec<(&str, Bundle)>> = LazyLock::new(|| {
     let [main, screen] = ["main.js", "screen.js"].map(|entry| bundle(entry, written));
-    let signals = later(SIGNALS, written, &main, "main.js");
-    [("main.js", main), ("screen.js", screen), (SIGNALS, signals)]
+    let views = LATER.map(|entry| (entry, later(entry, written, &main, "main.js")));
+    let pages = [("main.js", main), ("screen.js", screen)];
+    pages.into_iter().chain(views).collect()
 });
-/// The view of signals, which has a library of plots.
-const SIGNALS: &str = "signals/signals.js";
+/// What a page fetches when somebody opens it: a script of its own. That of the signals has a library
+/// of plots.
+const LATER: [&str; 5] = [
+    "signals/signals.js",
+    "setup/editor.js",
+    "line/line.js",
+    "health/health.js",
+    "log/recording.js",
+];
+/// The words of each language. A page fetches those that its reader wants.
+const LANGUAGES: [&str; 2] = ["words/en.js", "words/sv.js"];
 
 /// How the page looks: the parts of each folder, and then what holds for all of it, the rules for
-/// small and for large screens included. Comments are left out.
+/// small and for large screens included. Comments, and what only sets lines apart, are left out.
 static LOOK: LazyLock<String> = LazyLock::new(|| {
     let (of_all, of_parts): (Vec<_>, Vec<_>) = FILES
         .iter()
@@ -59,42 +68,57 @@ static LOOK: LazyLock<String> = LazyLock::new(|| {
         0 => part,
         _ => part.split_once("*/").map_or(part, |(_, rules)| rules),
     });
-    rules.collect()
+    let rules: String = rules.collect();
+    let lines: Vec<_> = rules.lines().map(str::trim).collect();
+    // No text of a rule holds one of these.
+    const SPACED: [&str; 7] = ["{ ", " {", "} ", "; ", ": ", ", ", " > "];
+    let close = |rules: String, spaced: &&str| rules.replace(spaced, spaced.trim());
+    let closed = SPACED.iter().fold(lines.join(" "), close);
+    closed.replace(";}", "}")
 });
 
-/// The table of sentences, and the limits of a floor, as a script of its own: what stands in it, the
-/// page never says otherwise.
-static TABLE: LazyLock<String> = LazyLock::new(|| {
-    let sentences = Sentence::all().map(
-        |Sentence {
-             name,
-             english,
-             swedish,
-         }| { (name, serde_json::json!({ "en": english, "sv": swedish })) },
-    );
-    let table: BTreeMap<_, _> = sentences.collect();
+/// The words of each language with its sentences: what stands in the table, the page never says
+/// otherwise.
+static WORDS: LazyLock<[String; 2]> = LazyLock::new(|| {
+    LANGUAGES.map(|language| {
+        let sentences = Sentence::all().map(|sentence| {
+            let is_swedish = language == "words/sv.js";
+            let said = if is_swedish {
+                sentence.swedish
+            } else {
+                sentence.english
+            };
+            (sentence.name, said)
+        });
+        let sentences = serde_json::json!(sentences.collect::<BTreeMap<_, _>>());
+        let words = written(language).unwrap_or_default();
+        format!("{words}export const SENTENCES = {sentences};\n")
+    })
+});
+
+/// The limits of a floor, as a script: the page has no others.
+static LIMITS: LazyLock<String> = LazyLock::new(|| {
     let limits = serde_json::json!({
         "squares": lager_floor::MAX_SQUARES,
         "leastSideCm": SideLength::MIN_CM,
         "mostSideCm": SideLength::MAX_CM,
         "goods": lager_floor::MAX_PRODUCTS,
     });
-    let table = serde_json::json!(table);
-    format!("export const TABLE = {table};\nexport const LIMITS = {limits};\n")
+    format!("export const LIMITS = {limits};\n")
 });
 
 /// Which edition of the page this program has, as a hash of all its files. A page that a browser
 /// opened before the program was replaced has another one.
 pub(crate) static EDITION: LazyLock<String> = LazyLock::new(|| {
     let mut hasher = DefaultHasher::new();
-    (FILES, &*TABLE).hash(&mut hasher);
+    (FILES, &*WORDS, &*LIMITS).hash(&mut hasher);
     format!("{:016x}", hasher.finish())
 });
 
 /// A file as it is written.
 fn written(name: &str) -> Option<&'static str> {
-    if name == "words/table.js" {
-        return Some(&TABLE);
+    if name == "setup/limits.js" {
+        return Some(&LIMITS);
     }
     let found = FILES.iter().find(|(file, _)| *file == name)?;
     Some(found.1)
@@ -113,10 +137,14 @@ pub(crate) fn file(path: &str, robot: &str) -> Option<(&'static str, String)> {
     if let Some((_, bundle)) = BUNDLES.iter().find(|(entry, _)| *entry == name) {
         return Some((SCRIPT, bundle.script.clone()));
     }
+    if let Some(at) = LANGUAGES.iter().position(|language| *language == name) {
+        return Some((SCRIPT, WORDS.get(at)?.clone()));
+    }
     let content = written(name)?;
     Some(match name.rsplit_once('.')?.1 {
         "html" => {
-            let content = content.replace("{robot}", robot);
+            let lines: Vec<_> = content.lines().map(str::trim_start).collect();
+            let content = lines.join("\n").replace("{robot}", robot);
             (HTML, content.replace("{edition}", &EDITION))
         }
         "css" => (STYLE, content.to_owned()),
@@ -143,17 +171,20 @@ mod tests {
 
     use super::*;
 
+    /// What a browser needs for the first view.
+    const FIRST: [&str; 5] = ["/", "/style.css", "/early.js", "/main.js", "/words/sv.js"];
+
     #[test]
     fn every_file_has_a_type_and_they_are_not_large() {
         for (name, _) in FILES {
             let (_, ending) = name.rsplit_once('.').unwrap();
             assert!(["js", "css", "html"].contains(&ending), "{name}");
         }
-        let bytes: usize = ["/", "/style.css", "/early.js", "/main.js"]
+        let bytes: usize = FIRST
             .iter()
             .map(|path| file(path, "r1").unwrap().1.len())
             .sum();
-        assert!(bytes < 390_000, "{bytes}");
+        assert!(bytes < 310_000, "{bytes}");
         assert!(LOOK.contains("#setup-bar") && !LOOK.contains("*/"));
     }
 
@@ -171,10 +202,15 @@ mod tests {
 
     #[test]
     fn what_a_slow_network_carries_is_small_and_unpacks_to_the_same() {
-        let first = carried(&["/", "/style.css", "/early.js", "/main.js"]);
-        assert!(first < 110_000, "{first}");
-        let later = carried(&["/signals/signals.js"]);
-        assert!(later < 40_000, "{later}");
+        let first = carried(&FIRST);
+        assert!(first < 88_000, "{first}");
+        let later = carried(
+            &LATER
+                .map(|name| format!("/{name}"))
+                .each_ref()
+                .map(String::as_str),
+        );
+        assert!(later < 52_000, "{later}");
     }
 
     #[test]
@@ -203,15 +239,21 @@ mod tests {
             }
         }
         // Each module is in one of the page's scripts, but for the other page's and the first script.
-        let bundles = ["/main.js", "/signals/signals.js"].map(|path| file(path, "").unwrap().1);
+        let content = |name: &str| file(&format!("/{name}"), "").unwrap().1;
+        let (main, later) = (content("main.js"), LATER.map(content));
         for (name, _) in scripts() {
-            let begins = format!("const {} = (", crate::bundle::constant(name));
-            let times = bundles.iter().filter(|script| script.contains(&begins));
-            let others = ["early.js", "screen.js"].contains(name);
-            assert_eq!(times.count(), usize::from(!others), "{name}");
+            let begins = format!("const {} = ", crate::bundle::constant(name));
+            let bundles = later.iter().chain([&main]);
+            let times = bundles.filter(|script| script.contains(&begins)).count();
+            let others = ["early.js", "screen.js"].contains(name) || LANGUAGES.contains(name);
+            assert_eq!(times, usize::from(!others), "{name}");
         }
-        let [main, signals] = bundles;
-        assert!(!main.contains("\nimport ") && signals.matches("import {").count() == 1);
+        assert!(!main.contains("\nimport "));
+        assert!(
+            later
+                .iter()
+                .all(|script| script.matches("import {").count() == 1)
+        );
     }
 
     #[test]
@@ -264,11 +306,7 @@ mod tests {
 
     #[test]
     fn both_languages_have_the_same_words() {
-        let words = written("words/words.js").unwrap();
-        let (english, rest) = words.split_once("  sv: {").unwrap();
-        let (_, english) = english.split_once("  en: {").unwrap();
-        let (swedish, _) = rest.split_once("\n};").unwrap();
-        let (english, swedish) = (keys(english), keys(swedish));
+        let [english, swedish] = LANGUAGES.map(|language| keys(written(language).unwrap()));
         assert!(english.len() > 100, "{english:?}");
         let missing: Vec<_> = english.symmetric_difference(&swedish).collect();
         assert!(missing.is_empty(), "{missing:?}");
@@ -276,11 +314,9 @@ mod tests {
 
     #[test]
     fn no_word_of_the_page_names_a_command_of_a_terminal() {
-        let words = written("words/words.js").unwrap();
-        let (_, tables) = words.split_once("  en: {").unwrap();
-        let (tables, _) = tables.split_once("\n};").unwrap();
-        let (english, _) = tables.split_once("  sv: {").unwrap();
-        assert!(!tables.contains('`') && !english.contains("lager "));
+        let [english, swedish] = LANGUAGES.map(|language| written(language).unwrap());
+        let tables = [english, swedish];
+        assert!(!tables.iter().any(|words| words.contains('`')) && !english.contains("lager "));
         for page in ["index.html", "screen.html"] {
             let html = written(page).unwrap();
             assert!(!html.contains('`') && !html.contains("lager "), "{page}");
@@ -295,9 +331,7 @@ mod tests {
 
     #[test]
     fn each_word_that_the_page_says_is_in_the_table_and_each_of_the_table_is_said() {
-        let words = written("words/words.js").unwrap();
-        let (english, _) = words.split_once("  sv: {").unwrap();
-        let known = keys(english.split_once("  en: {").unwrap().1);
+        let known = keys(written("words/en.js").unwrap());
         let mut said = BTreeSet::new();
         for (_, content) in FILES {
             for before in [
@@ -318,7 +352,8 @@ mod tests {
         // Others stand in lists and in names that are put together.
         let everything: String = FILES.iter().map(|(.., content)| *content).collect();
         let put_together = [
-            "mode_", "did_", "servo_", "board_", "side_", "look_", "colour_", "theme_", "mark_",
+            "mode_", "did_", "servo_", "board_", "side_", "look_", "view_", "colour_", "theme_",
+            "mark_",
         ];
         let unsaid: Vec<_> = known
             .iter()

@@ -47,15 +47,25 @@ pub(crate) struct Visit {
     began: Duration,
     /// Lines for the page.
     lines: String,
-    robots: BTreeMap<Name, LastTold>,
+    robots: BTreeMap<Name, Told>,
     warehouse: Option<Option<Warehouse>>,
     revision: Option<u64>,
-    about: Instant,
+    looked: Instant,
     /// What follows the station's time in the line that is due, if one is.
     wants_time: Option<String>,
     stayed: Instant,
     there: bool,
     unread: u32,
+}
+
+/// What a page has been told about a robot.
+#[derive(Debug, Default)]
+struct Told {
+    /// When it was told anything.
+    at: Option<Instant>,
+    /// The last line about the robot, without the age of what it said.
+    about: String,
+    reports: LastTold,
 }
 
 impl Visit {
@@ -80,7 +90,7 @@ impl Visit {
             robots: BTreeMap::new(),
             warehouse: None,
             revision: None,
-            about: now,
+            looked: now,
             wants_time: Some(String::new()),
             stayed: now,
             there: true,
@@ -323,9 +333,9 @@ impl Visit {
         self.tell_events();
         let handle = self.page.shared.handle.clone();
         let revision = handle.revision();
-        if self.revision != Some(revision) || self.about.elapsed() >= ABOUT {
+        if self.revision != Some(revision) || self.looked.elapsed() >= ABOUT {
             self.revision = Some(revision);
-            self.about = Instant::now();
+            self.looked = Instant::now();
             self.tell_warehouse();
             for view in handle.robots() {
                 self.tell_robot(&view);
@@ -420,22 +430,29 @@ impl Visit {
         let world = self.page.shared.world.as_ref();
         let renews = u8::from(world.is_some_and(|world| world.robot == *name));
         let age = shown.state.as_ref().map(|state| state.age(view.now));
-        let _ = write!(
-            self.lines,
-            "about {name} connected={connected} speaks={speaks} driver={driver}"
-        );
-        let asks = self.handover().who(name).map(str::to_owned);
-        if let Some(who) = asks {
-            let _ = write!(self.lines, " asks={who}");
+        let mut about =
+            format!("about {name} connected={connected} speaks={speaks} driver={driver}");
+        if let Some(who) = self.handover().who(name) {
+            let _ = write!(about, " asks={who}");
         }
-        let _ = write!(self.lines, " uses={uses} renews={renews}");
+        let _ = write!(about, " uses={uses} renews={renews}");
+
+        let told = self.robots.entry(name.clone()).or_default();
+        let reports = told.reports.newer(shown);
+        // Most of what the station has heard says only that the robot is there, as its next state
+        // does.
+        let is_told = told.at.is_some_and(|at| at.elapsed() < ABOUT) && told.about == about;
+        if is_told && reports.is_empty() {
+            return;
+        }
+        told.at = Some(Instant::now());
+        self.lines.push_str(&about);
+        told.about = about;
         if let Some(age) = age {
             let _ = write!(self.lines, " age_ms={}", age.as_millis());
         }
         self.lines.push('\n');
-
-        let told = self.robots.entry(name.clone()).or_default();
-        for (_, report) in told.newer(shown) {
+        for (_, report) in reports {
             let _ = writeln!(self.lines, "from {name} {report}");
         }
     }

@@ -7,7 +7,7 @@ use core::time::Duration;
 
 use lager_control::{Board, EEPROM_LENGTH, Motor, SensorBoard, SteeringBoard};
 use lager_plant::World;
-use lager_wire::ResetCause;
+use lager_wire::{ResetCause, ResetOrder};
 
 use crate::exde::ExDe;
 use crate::uart::Uart;
@@ -20,6 +20,8 @@ const EEPROM_WRITE_NS: u64 = 3_400_000;
 pub(crate) struct Chip {
     pub(crate) uart: Uart,
     pub(crate) cause: ResetCause,
+    /// Whether the Pi has told it to reset.
+    pub(crate) resets: bool,
     /// The time when its clock started, in ns of robot time.
     pub(crate) boot_ns: u64,
     /// The time when its loop last reset the watchdog's timer, in ns of robot time.
@@ -72,6 +74,11 @@ macro_rules! board {
 
             fn reset_cause(&self) -> ResetCause {
                 self.chip.cause
+            }
+
+            // A simulated board has no bootloader, so it only restarts.
+            fn reset(&mut self, _: ResetOrder) {
+                self.chip.resets = true;
             }
 
             fn kick_watchdog(&mut self) {
@@ -145,6 +152,6 @@ impl SteeringBoard for SteeringPins<'_> {
     }
 
     fn battery_decivolts(&mut self) -> u8 {
-        (self.world.battery_volts() * 10.0) as u8
+        (self.world.battery_input_volts() * 40.0) as u8
     }
 }

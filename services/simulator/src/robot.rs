@@ -21,7 +21,7 @@ use lager_control::{SensorConfig, SensorUnit, SteeringConfig, SteeringUnit};
 use lager_plant::arm::SERVOS;
 use lager_plant::noise::{Noise, START_STREAM};
 use lager_plant::{
-    Hand, HandsOff, Make, Pose, Snapshot, Warehouse, WarehouseError, World, WorldState,
+    Build, Hand, HandsOff, Make, Pose, Snapshot, Warehouse, WarehouseError, World, WorldState,
 };
 use lager_wire::{ArmProfile, ResetCause};
 
@@ -51,6 +51,8 @@ pub struct RobotOptions {
     pub obstacles: u32,
     /// Which imperfections the robot has.
     pub make: Make,
+    /// How the robot is built. Its boards do not know that unless they are told.
+    pub build: Build,
     /// Baud rate of both serial lines.
     pub baud: u32,
     /// The reason that the boards give for their first start.
@@ -67,6 +69,7 @@ impl Default for RobotOptions {
             seed: 1,
             obstacles: 0,
             make: Make::Varied,
+            build: Build::default(),
             baud: 500_000,
             cause: ResetCause::PowerOn,
             sensor: SensorConfig::default(),
@@ -97,7 +100,8 @@ impl Robot {
         let mut spread = Noise::new(options.seed, START_STREAM);
         let mut starts_ns = || START_UP_NS + spread.bits() % 5_000 * 1_000;
         let pose = resting_arm(&options.steering.arm.profile);
-        let mut world = World::new(warehouse, options.seed, options.make, pose)?;
+        let world = World::new(warehouse, options.seed, options.make, pose)?;
+        let mut world = world.built(options.build);
         world.scatter_obstacles(options.obstacles, options.seed)?;
         Ok(Self {
             world,
@@ -357,6 +361,9 @@ impl Robot {
         let unit = unit.get_or_insert_with(|| SensorUnit::new(&pins, self.options.sensor));
         let wanted_us = unit.step(&mut pins);
         self.sensor.plan(wanted_us);
+        if core::mem::take(&mut self.sensor.chip.resets) {
+            self.reset_board(Wire::Sensor, ResetCause::Ordered);
+        }
     }
 
     fn step_steering(&mut self, now: u64) {
@@ -374,6 +381,9 @@ impl Robot {
         let unit = unit.get_or_insert_with(|| SteeringUnit::new(&pins, self.options.steering));
         let wanted_us = unit.step(&mut pins);
         self.steering.plan(wanted_us);
+        if core::mem::take(&mut self.steering.chip.resets) {
+            self.reset_board(Wire::Steering, ResetCause::Ordered);
+        }
     }
 }
 

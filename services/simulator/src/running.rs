@@ -43,6 +43,7 @@ impl<Unit> Running<Unit> {
             chip: Chip {
                 uart: Uart::new(baud),
                 cause,
+                resets: false,
                 boot_ns: starts_ns,
                 kicked_ns: starts_ns,
                 now_ns: 0,

@@ -402,6 +402,7 @@ impl Attendant {
             frames: self.narrator.frames(),
             lost_here: self.narrator.lost_here(),
             lost_elsewhere: self.narrator.lost_elsewhere(),
+            at_work: self.ears.at_work(),
         }))?;
         Ok(())
     }

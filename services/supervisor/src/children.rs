@@ -27,6 +27,7 @@ use rustix::fs::{MemfdFlags, memfd_create};
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
 
 use crate::backoff::Backoff;
+use crate::manager::VARIABLES;
 use crate::service::Service;
 use crate::signals::Signals;
 
@@ -394,6 +395,9 @@ impl Process {
                 // A process group of its own, so that Ctrl-C reaches only the supervisor, which
                 // then stops the children in order.
                 .process_group(0);
+            for variable in VARIABLES {
+                command.env_remove(variable);
+            }
             if start.resume {
                 command.arg("--resume");
             }

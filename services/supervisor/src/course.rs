@@ -229,6 +229,11 @@ impl Course {
         self.stage == Stage::Joining
     }
 
+    /// Whether everything has started.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.stage == Stage::Whole
+    }
+
     /// Whether the bus is swept, so that the robot may end.
     pub(crate) fn is_swept(&self) -> bool {
         matches!(self.stage, Stage::Joining | Stage::Whole)

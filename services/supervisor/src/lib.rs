@@ -24,6 +24,7 @@ pub mod hands;
 pub mod kept_orders;
 mod last_states;
 mod link;
+mod manager;
 pub mod mission;
 mod narrator;
 mod protocol;
@@ -38,6 +39,7 @@ pub mod stopped;
 mod terminal;
 
 pub use children::Parent;
+pub use manager::ServiceManager;
 pub use robot::{Plan, Robot, World};
 pub use service::Service;
 pub use terminal::Terminal;

@@ -214,6 +214,12 @@ impl Narrator {
             let was_up = before.is_some_and(|before| before.up != 0);
             if now.up != 0 && !was_up {
                 self.push("bridge", &format!("the {name} board is connected"));
+                if let Some(misfit) = now.misfit() {
+                    self.push(
+                        "bridge",
+                        &format!("the {name} board does not fit: {misfit}"),
+                    );
+                }
             } else if now.up == 0 && was_up {
                 self.push("bridge", &format!("the {name} board is silent"));
             } else if before.is_some_and(|before| before.reboots < now.reboots) {

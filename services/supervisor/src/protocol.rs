@@ -118,6 +118,8 @@ pub(crate) struct Pulse {
     pub(crate) lost_here: u64,
     /// Frames lost on the wires and by the services.
     pub(crate) lost_elsewhere: u64,
+    /// How many services are at work.
+    pub(crate) at_work: usize,
 }
 
 /// A service that lives and is silent.

@@ -23,6 +23,7 @@ use crate::course::{Course, Event, Services, Step};
 use crate::figures::Figures;
 use crate::kept_orders::Keeping;
 use crate::link::{AttendantLink, SILENCE};
+use crate::manager::ServiceManager;
 use crate::mission::Mission;
 use crate::narrator::Note;
 use crate::protocol::{Begin, Line, Pulse, Request, Sweep, Word};
@@ -97,13 +98,14 @@ pub struct Robot {
     folder_looked: Instant,
     /// What others were told last of the services.
     told: Vec<Watched>,
+    manager: ServiceManager,
 }
 
 impl Robot {
     /// A robot of which nothing has started.
     ///
     /// # Errors
-    /// This program's own file is not found.
+    /// This program's own file is not found, or the system has no thread.
     pub fn new(plan: Plan, lock: NameLock, signals: Signals, terminal: Terminal) -> Result<Self> {
         let now = Instant::now();
         let children = Children::new(plan.config.clone())?;
@@ -133,6 +135,7 @@ impl Robot {
             began: now,
             folder_looked: now,
             told: Vec::new(),
+            manager: ServiceManager::of_this_process()?,
         })
     }
 
@@ -144,11 +147,13 @@ impl Robot {
         for line in core::mem::take(&mut self.plan.first_notes) {
             self.note(&line);
         }
+        self.manager.status("starts its services");
         let steps = self.course.begin(self.now());
         self.carry_out(steps)?;
         while !self.signals.end_asked() {
             self.turn()?;
             self.tell_services();
+            self.tell_manager();
             let ended = self.plan.mission.outcome().is_some();
             let over = ended || self.children.hopeless().is_some();
             // Clear a damaged bus before the end, too.
@@ -169,6 +174,7 @@ impl Robot {
     /// The JSON line cannot be written.
     pub fn finish(mut self, json: bool) -> Result<bool> {
         let hopeless = self.children.hopeless();
+        self.manager.stopping();
         // Stop the robot before anything else.
         self.stop(PATIENCE);
         let mission = core::mem::take(&mut self.plan.mission);
@@ -215,6 +221,10 @@ impl Robot {
         }
         let due = self.course.look(self.now());
         self.carry_out(due)?;
+        if !self.attendant.joined {
+            // This loop goes round, and it waits for no longer than the course allows.
+            self.manager.goes_on();
+        }
         if self.course.rests() {
             return Ok(());
         }
@@ -239,6 +249,31 @@ impl Robot {
         if services != self.told {
             self.lock.tell(&services);
             self.told = services;
+        }
+    }
+
+    /// Tells the service manager that the robot is up, once its services are at work. Those that
+    /// talk to others need not: a port may be taken for long. Nor need the boards be there: a
+    /// missing board is a state of the robot.
+    fn tell_manager(&mut self) {
+        if self.manager.knows() || !self.course.is_whole() {
+            return;
+        }
+        let running: Vec<Service> = self
+            .children
+            .running()
+            .map(|(service, _)| service)
+            .collect();
+        let mut movers = self
+            .plan
+            .body
+            .into_iter()
+            .chain([Service::Bridge, Service::Logic]);
+        // The attendant is one of them, and tells of the others.
+        let services = running.len() - 1;
+        if movers.all(|mover| running.contains(&mover)) && self.figures.last.at_work >= services {
+            self.manager.ready();
+            self.manager.status(&format!("{services} services are up"));
         }
     }
 
@@ -281,7 +316,10 @@ impl Robot {
                         self.happened(Event::HandedOver(service))?;
                     }
                 }
-                Step::Say(text) => self.note(&text),
+                Step::Say(text) => {
+                    self.manager.status(&text);
+                    self.note(&text);
+                }
                 Step::StopAll(lost) => {
                     self.stop(HASTE);
                     lost.iter().for_each(|why| self.give_mission_up(why));
@@ -383,7 +421,11 @@ impl Robot {
     }
 
     fn wait(&self) {
-        let at_most = self.course.idle(self.now(), LOOK);
+        let at_most = self
+            .manager
+            .rhythm()
+            .map_or(LOOK, |rhythm| rhythm.min(LOOK));
+        let at_most = self.course.idle(self.now(), at_most);
         let mut sources = vec![self.signals.as_fd(), self.signals.renewal()];
         sources.extend(self.attendant.line.as_ref().map(AsFd::as_fd));
         self.children.wait(&sources, at_most);
@@ -396,6 +438,7 @@ impl Robot {
                 Ok(Some(word)) => {
                     self.course.attended(self.attendant.look());
                     self.attendant.spoke = self.attendant.ran;
+                    self.manager.goes_on();
                     if let Some(event) = self.take_down(word) {
                         self.happened(event)?;
                     }
@@ -416,7 +459,10 @@ impl Robot {
         match word {
             Word::Swept => return Some(Event::Swept),
             Word::Pulse(pulse) => return self.take_pulse(pulse),
-            Word::Note(note) => self.terminal.show(&note),
+            Word::Note(note) => {
+                self.manager.status(&format!("{} {}", note.who, note.text));
+                self.terminal.show(&note);
+            }
             Word::HandedOver(service) => return Some(Event::HandedOver(service)),
             Word::Silent(silence) => {
                 let is_it = self.children.process(silence.service) == Some(silence.pid);

@@ -13,7 +13,7 @@ use lager_home::{Home, Life, Lock, UnitName, Watched};
 use lager_lines::secret::Secret;
 use lager_ports::BusConfig;
 use lager_stop::{StopPage, StopWord};
-use lager_topics::{Role, StopCause};
+use lager_topics::{LAGER, Role, StopCause};
 
 use crate::service::Service;
 
@@ -258,10 +258,7 @@ impl Drop for NameLock {
     /// EEPROM.
     fn drop(&mut self) {
         if self.is_held() {
-            for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, QUEUE, SECRET] {
-                let _ = fs::remove_file(self.folder.join(name));
-            }
-            self.place.forget_watched(&self.robot);
+            self.place.forget(&self.robot, LAGER.kept);
             // It stays if there is something in it.
             let _ = fs::remove_dir(self.folder.join(EEPROM));
             StopWord::tidy(&self.folder.join(StopPage::FILE));
@@ -295,4 +292,42 @@ fn write_secret(folder: &Path, secret: &Secret) -> Result<()> {
         fs::rename(&new, &path)
     };
     whole().with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process;
+
+    use super::*;
+
+    /// A file that this list lacks would stay for ever in the folder of a robot that was killed.
+    #[test]
+    fn all_that_a_robot_keeps_is_known_to_the_application() {
+        let known = [CONFIG, SENSOR, STEERING, CLOCK, EEPROM, GAG, QUEUE, SECRET];
+        for name in known {
+            assert!(LAGER.kept.contains(&name), "{name}");
+        }
+        assert_eq!(LAGER.kept.len(), known.len(), "{:?}", LAGER.kept);
+    }
+
+    #[test]
+    fn of_what_is_told_and_half_written_nothing_stays() {
+        let at = PathBuf::from(format!("/dev/shm/lpkept{}", process::id()));
+        let place = Home::open("lager", Some(&at)).expect("a folder");
+        let robot = UnitName::default();
+        let folder = place.unit(&robot);
+        for name in LAGER.kept {
+            fs::write(folder.join(name), "").expect("a file");
+            fs::write(folder.join(format!("{name}.new")), "").expect("a file");
+        }
+        place.write_watched(&robot, &[]).expect("a file");
+        fs::write(folder.join("services.new"), "").expect("a file");
+        place.listen_asked(&robot).expect("a file");
+        fs::write(folder.join("own.notes"), "").expect("a file");
+        place.forget(&robot, LAGER.kept);
+        let left = fs::read_dir(&folder).expect("a folder").flatten();
+        let left: Vec<_> = left.map(|entry| entry.file_name()).collect();
+        assert_eq!(left, ["own.notes"]);
+        place.remove();
+    }
 }

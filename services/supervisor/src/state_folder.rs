@@ -1,8 +1,10 @@
 //! The files that outlive `lager up` and `lager station`: the warehouse that somebody has saved in
-//! the panel, the orders that wait, and the history of the robots.
+//! the panel, how a real robot is built, the orders that wait, and the history of the robots.
 //!
 //! ```text
-//!   the warehouse    in the file that was named, else NAME.toml of a built-in one, in
+//!   the warehouse    in the file that was named, else NAME.toml of a built-in one, else
+//!                    warehouse.toml of real boards that nobody told of one, in
+//!   the robot        how it is built: in the file that was named, else robot.toml of real boards, in
 //!   the orders       and everything else, in
 //!                    the state folder: --state or `state`, else
 //!                      .state in the folder of the bus, if that was named, else
@@ -30,6 +32,8 @@ use lager_station::files;
 const BESIDE_A_BUS: &str = ".state";
 /// For `lager station`. No robot can have this name.
 const STATION: &str = ".station";
+/// How the robot is built.
+const ROBOT: &str = "robot.toml";
 /// The copy of the warehouse.
 const RUNNING: &str = "running.toml";
 /// The orders of a robot's own queue.
@@ -83,14 +87,24 @@ impl StateFolder {
         Self(root.join(name))
     }
 
+    /// The folder of a station that runs by itself, which may not exist.
+    pub fn path_of_station(root: &Path) -> PathBuf {
+        root.join(STATION)
+    }
+
     /// The folder of a station that runs by itself.
     ///
     /// # Errors
     /// The folder cannot be made.
     pub fn of_station(root: &Path) -> Result<Self> {
-        let folder = Self(root.join(STATION));
+        let folder = Self(Self::path_of_station(root));
         folder.make()?;
         Ok(folder)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.0
     }
 
     /// Makes the folder, for this user alone.
@@ -110,15 +124,20 @@ impl StateFolder {
         })
     }
 
-    /// Where the changes of a built-in warehouse are kept.
+    /// Where the changes of a built-in warehouse are kept. `None` = where a warehouse is kept that
+    /// somebody else describes.
     #[must_use]
-    pub fn warehouse(&self, builtin: &str) -> PathBuf {
-        self.0.join(format!("{builtin}.toml"))
+    pub fn warehouse(&self, builtin: Option<&str>) -> PathBuf {
+        self.0.join(match builtin {
+            Some(builtin) => format!("{builtin}.toml"),
+            None => "warehouse.toml".to_owned(),
+        })
     }
 
-    /// Where a station keeps a warehouse that somebody else describes.
-    pub fn warehouse_of_nobody(&self) -> PathBuf {
-        self.0.join("warehouse.toml")
+    /// Where the description of a real robot is kept.
+    #[must_use]
+    pub fn robot(&self) -> PathBuf {
+        self.0.join(ROBOT)
     }
 
     /// Where a station keeps its queue.
@@ -136,11 +155,11 @@ impl StateFolder {
         self.0.join(ORDERS)
     }
 
-    /// The saved file of a built-in warehouse, if there is one that `read` can read, and what to
-    /// tell people.
+    /// The file of [`StateFolder::warehouse`], if there is one that `read` can read, and what to tell
+    /// people.
     pub fn saved(
         &self,
-        builtin: &str,
+        builtin: Option<&str>,
         read: impl FnOnce(&str) -> Result<()>,
     ) -> (Option<String>, Option<String>) {
         let file = self.warehouse(builtin);
@@ -148,10 +167,14 @@ impl StateFolder {
             return (None, None);
         }
         let path = file.display().to_string();
+        let without = match builtin {
+            Some(builtin) => format!("it is the built-in `{builtin}`"),
+            None => "there is none, and the robot waits for one".to_owned(),
+        };
         match read(&path) {
             Ok(()) => {
                 let note = format!(
-                    "the warehouse is the one that was saved in {path}; without that file it is the built-in `{builtin}`"
+                    "the warehouse is the one that was saved in {path}; without that file {without}"
                 );
                 (Some(path), Some(note))
             }
@@ -161,7 +184,7 @@ impl StateFolder {
                     Err(error) => format!("it stays there: {error}"),
                 };
                 let why = format!(
-                    "the warehouse that was saved cannot be used: {error:#}; {aside}, and the built-in `{builtin}` is used"
+                    "the warehouse that was saved cannot be used: {error:#}; {aside}; without it {without}"
                 );
                 (None, Some(why))
             }
@@ -250,17 +273,22 @@ mod tests {
     fn a_saved_warehouse_that_cannot_be_read_is_put_aside_and_told() {
         let root = std::env::temp_dir().join(format!("lager-saved-{}", std::process::id()));
         let folder = StateFolder::of_robot(&root, "r1");
-        assert_eq!(folder.saved("small", |_| Ok(())), (None, None));
+        let small = Some("small");
+        assert_eq!(folder.saved(small, |_| Ok(())), (None, None));
         folder.make().unwrap();
-        fs::write(folder.warehouse("small"), "size = ").unwrap();
-        let (file, note) = folder.saved("small", |_| Ok(()));
+        fs::write(folder.warehouse(small), "size = ").unwrap();
+        let (file, note) = folder.saved(small, |_| Ok(()));
         assert!(file.unwrap().ends_with("r1/small.toml"));
         assert!(note.unwrap().contains("was saved in"));
-        let (file, note) = folder.saved("small", |_| bail!("no number"));
+        let (file, note) = folder.saved(small, |_| bail!("no number"));
         assert_eq!(file, None);
         let note = note.unwrap();
         assert!(note.contains("no number; it is now"), "{note}");
-        assert!(!folder.warehouse("small").exists());
+        assert!(!folder.warehouse(small).exists());
+        fs::write(folder.warehouse(None), "size = ").unwrap();
+        let (file, note) = folder.saved(None, |_| Ok(()));
+        assert!(file.unwrap().ends_with("r1/warehouse.toml"));
+        assert!(note.unwrap().ends_with("the robot waits for one"));
         fs::remove_dir_all(root).unwrap();
     }
 

@@ -1,6 +1,7 @@
 //! A board for tests and measurements: the board's end of a cable and its end of a link.
 //!
-//! It answers handshakes and knows when its next report is due. The test does everything else.
+//! It answers handshakes, takes every setting that it is told, and knows when its next report is due.
+//! The test does everything else.
 
 use lager_home::Clock;
 use lager_wire::link::{BoardEvent, BoardLink};
@@ -43,12 +44,22 @@ impl Board {
         })
     }
 
-    /// Reads what came, hands over each packet's data, and sends a handshake if one is due.
+    /// Reads what came, hands over each packet's data, accepts each setting, and sends a handshake if
+    /// one is due.
     ///
     /// # Errors
     /// As [`Cable::read`] and [`Cable::write`].
-    pub fn answer(&mut self, packet: impl FnMut(Payload)) -> Result<(), Refused> {
-        self.take(packet)?;
+    pub fn answer(&mut self, mut packet: impl FnMut(Payload)) -> Result<(), Refused> {
+        let mut settings = Vec::new();
+        self.take(|payload| {
+            if let Payload::Setting(setting) = payload {
+                settings.push(setting);
+            }
+            packet(payload);
+        })?;
+        for setting in settings {
+            self.send(answer_to(&setting, SettingStatus::Accepted))?;
+        }
         match self.link.poll(board_us()) {
             Some(syn) => self.cable.write(&syn),
             None => Ok(()),
@@ -124,7 +135,7 @@ pub fn wheels_in_the_air(code: u8) -> Payload {
 
 /// A board's answer to a setting.
 #[must_use]
-pub fn answer_to(setting: &Setting, status: SettingStatus) -> Payload {
+pub(crate) fn answer_to(setting: &Setting, status: SettingStatus) -> Payload {
     Payload::SettingReply(SettingReply {
         key: setting.key,
         seq: setting.seq,

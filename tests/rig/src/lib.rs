@@ -18,7 +18,7 @@ pub mod process;
 pub mod schedule;
 mod shared;
 
-pub use board::{Board, GAP_US, SPEAK_EVERY_NS, answer_to, wheels_in_the_air};
+pub use board::{Board, GAP_US, SPEAK_EVERY_NS, wheels_in_the_air};
 pub use cable::{Cable, timespec};
 pub use domain::{Domain, NoPlace, bus_at};
 pub use host::Host;

@@ -60,7 +60,7 @@ impl Outset {
         self.map.tick();
         if !self.is_autonomous {
             let health = self.health.latest()?;
-            if health.is_some_and(|health| health.sensor.up != 0 && health.steering.up != 0) {
+            if health.is_some_and(|health| health.boards_are_ready()) {
                 let ask = Ask {
                     kind: AskKind::SetMode.into(),
                     mode: Mode::Autonomous.into(),

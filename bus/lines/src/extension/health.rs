@@ -32,6 +32,13 @@ fields! {
         sensor_version: u8 = "a number from 0 to 255",
         /// The same of the steering board.
         steering_version: u8 = "a number from 0 to 255",
+        /// The build number of the sensor board's image; 0 is an original board, or an image
+        /// without one.
+        sensor_build: u16 = "a number from 0 to 65535",
+        /// The same of the steering board.
+        steering_build: u16 = "a number from 0 to 65535",
+        /// The build number of the images that fit the robot's program.
+        program_build: u16 = "a number from 0 to 65535",
         /// How often the sensor board has restarted.
         sensor_restarts: u32 = "a number from 0 to 4294967295",
         /// How often the steering board has restarted.
@@ -150,7 +157,7 @@ macro_rules! listed {
     };
 }
 
-listed!(Services, Service, 8);
+listed!(Services, Service, 7);
 listed!(Findings, Finding, 4);
 
 impl Item for Service {

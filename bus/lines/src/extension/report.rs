@@ -87,7 +87,8 @@ pub struct Event {
     /// The product of that order.
     pub product: Option<ProductId>,
     /// The reason, where there is one; with `way_blocked` the direction of the way. With `stopped`
-    /// the cause and who has set it, with `mode` the mode, with `restarted` the service.
+    /// the cause and who has set it, with `mode` the mode, with `ended` and `restarted` the service,
+    /// with `asked` the part by which a person has asked, and the words of the action.
     pub text: Text,
 }
 
@@ -102,7 +103,11 @@ pub enum Happened {
     Resumed,
     /// Somebody else may drive.
     Mode,
-    /// A service of the robot has been started anew.
+    /// A person has asked the robot for something, but not through the external computer.
+    Asked,
+    /// A service of the robot has ended although nobody asked it to.
+    Ended,
+    /// It has been started anew, and runs.
     Restarted,
     /// The external computer is out of reach.
     LinkLost,
@@ -117,6 +122,8 @@ impl Happened {
             Self::Stopped,
             Self::Resumed,
             Self::Mode,
+            Self::Asked,
+            Self::Ended,
             Self::Restarted,
             Self::LinkLost,
             Self::LinkBack,
@@ -131,6 +138,8 @@ impl Happened {
             Self::Stopped => "stopped",
             Self::Resumed => "resumed",
             Self::Mode => "mode",
+            Self::Asked => "asked",
+            Self::Ended => "ended",
             Self::Restarted => "restarted",
             Self::LinkLost => "link_lost",
             Self::LinkBack => "link_back",
@@ -302,8 +311,8 @@ fn read_or_dash<T>(
 impl Event {
     fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
         let wanted = "one of in_position, getting_item, item_delivered, next_node, refused, \
-                      pickup_refused, failed, way_blocked, stopped, resumed, mode, restarted, \
-                      link_lost and link_back";
+                      pickup_refused, failed, way_blocked, stopped, resumed, mode, asked, \
+                      ended, restarted, link_lost and link_back";
         Ok(Self {
             kind: reader.word().read(wanted, Happened::from_word)?,
             node: Node::read(reader)?,

@@ -98,7 +98,7 @@ const ANSWER: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, ar
 const ACTION: &str = "one of order, cancel, first, up, clear, back, mode, resume, reset, place, \
                       picked, pick, drive, arm, gains, calibrate, horn and obstacle";
 const EVENT: &str = "one of in_position, getting_item, item_delivered, next_node, refused, \
-                     pickup_refused, failed, way_blocked, stopped, resumed, mode, restarted, \
+                     pickup_refused, failed, way_blocked, stopped, resumed, mode, asked, ended, restarted, \
                      link_lost and link_back";
 
 #[test]

@@ -50,6 +50,9 @@ coded! {
         /// In an earlier run of the robot, the goods of a product were not in their place; `order_id`
         /// is the product's number.
         GoodsGoneEarlier = 18,
+        /// The reset button was pressed on a robot that stood on the delivery node already, to end
+        /// the stop of a fresh start. Its place and its orders stay.
+        StartPressed = 19,
     }
 }
 

@@ -1,25 +1,27 @@
 //! The state of the links and of the arbiter: `link/health`.
 
+use core::fmt;
+
 use lager_orders::{Code, Mode, Reason};
 use lager_sample::{Tag, coded, payload};
-use lager_wire::ResetCause;
+use lager_wire::{BUILD, ResetCause, Version};
 
 use super::steering::{Finish, Origin, Refusal};
 use super::stop::StopCause;
 use crate::role::Role;
 
 coded! {
-    /// How far the steering board has got with the arm's profile (`[arm]` of the configuration).
-    pub enum ArmProfileState {
+    /// How far a board has got with a part of the robot's description.
+    pub enum ProfileState {
         /// No board that knows profiles is connected.
         NoBoard = 0,
-        /// The bridge is sending the profile; the arm stands meanwhile.
+        /// The bridge is sending the profile; what depends on it stands meanwhile.
         Telling = 1,
         /// The board obeys the profile.
         Accepted = 2,
-        /// The board does not accept the profile; the arm is not moved.
+        /// The board does not accept the profile; what depends on it is not moved.
         Refused = 3,
-        /// The board does not answer; the arm is not moved until it does.
+        /// The board does not answer; what depends on it is not moved until it does.
         Unanswered = 4,
     }
 }
@@ -67,6 +69,8 @@ payload! {
         pub reset_cause: Tag<ResetCause>,
         /// Port on which it was found: 0 = configured as sensor, 1 = as steering, `0xFF` = none.
         pub port: u8 = Self::UNKNOWN,
+        /// Build number of the board's image; 0 is an original board, or an image without one.
+        pub build: u16,
         /// The board's own count of packets that it refused; saturates.
         pub board_bad_packets: u8,
         /// The board's own count of packets missing by id; saturates.
@@ -83,13 +87,50 @@ payload! {
         pub board_longest_loop_100us: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 5],
+        pub reserved: [u8; 3],
     }
 }
 
 impl BoardHealth {
     /// `version` and `port` before they are known.
     pub const UNKNOWN: u8 = 0xFF;
+
+    /// What is wrong with the board's image, if that is known not to fit this program.
+    pub fn misfit(&self) -> Option<Misfit> {
+        match self.version {
+            Self::UNKNOWN => None,
+            version => Misfit::of(version, self.build),
+        }
+    }
+}
+
+/// The image of a board of ours has another build number than the images that fit this program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Misfit {
+    build: u16,
+}
+
+impl Misfit {
+    /// Judges an image by the version of its packets and its build number. An original board, which
+    /// has version 0, has no number, and is none of ours.
+    pub fn of(version: u8, build: u16) -> Option<Self> {
+        (version != Version::Original as u8 && build != BUILD).then_some(Self { build })
+    }
+}
+
+impl fmt::Display for Misfit {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { build } = self;
+        write!(
+            formatter,
+            "its image has build {build}, and this program goes with build {BUILD}; "
+        )?;
+        formatter.write_str(if *build < BUILD {
+            "`lager board update` gives it the image that fits"
+        } else {
+            "install the newer program that came with that image"
+        })
+    }
 }
 
 payload! {
@@ -116,7 +157,7 @@ impl CalibratedSensor {
 
 payload! {
     /// Both links and the arbiter: all that a restarted bridge needs to go on.
-    pub struct Health: 216 bytes {
+    pub struct Health: 224 bytes {
         /// The sensor board's link.
         pub sensor: BoardHealth,
         /// The steering board's link.
@@ -168,7 +209,7 @@ payload! {
         /// Why nobody may move the robot at present.
         pub blocked: Tag<Refusal>,
         /// How far the steering board has got with the arm's profile.
-        pub arm_profile: Tag<ArmProfileState>,
+        pub arm_profile: Tag<ProfileState>,
         /// How the last calibration of the line sensors went.
         pub calibration: Tag<Calibration>,
         /// Line sensors to which it gave a new threshold, 0..=11.
@@ -183,15 +224,27 @@ payload! {
         pub stop_origin: Tag<Role>,
         /// 1 = somebody has set the mode since the robot was switched on.
         pub mode_chosen: u8,
+        /// How far the steering board has got with motors and battery.
+        pub steering_profile: Tag<ProfileState>,
+        /// How far the sensor board has got with its sensors.
+        pub sensor_profile: Tag<ProfileState>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 1],
+        pub reserved: [u8; 7],
     }
 }
 
 impl Health {
     /// `gain_p` and `gain_d` before a request has set them. 0 is a valid gain.
     pub const NEVER_SET: i16 = -1;
+
+    /// Whether both boards are up, and nobody is telling them how their robot is built.
+    pub fn boards_are_ready(&self) -> bool {
+        let told = [self.sensor_profile, self.steering_profile];
+        self.sensor.up != 0
+            && self.steering.up != 0
+            && told.iter().all(|told| *told != ProfileState::Telling)
+    }
 
     /// Why the last calibration did not end well; `None` if it did.
     pub fn calibration_failure(&self) -> Option<Reason> {

@@ -145,6 +145,17 @@ coded! {
         GoodsGone = 61,
         /// The robot sounds its horn.
         Honks = 62,
+        /// Reset was pressed at the delivery node, and the stop of the fresh start has ended.
+        StartedByReset = 63,
+        /// Reset was pressed, and does not end the stop in force.
+        ResetKeepsStop = 64,
+        /// Reset was pressed while a board or logic was silent; the stop stays.
+        ResetUnheard = 65,
+        /// Reset was pressed before there was a map; the stop stays.
+        ResetWithoutMap = 66,
+        /// Reset was pressed on a robot that did not know that it stands on the delivery node; the
+        /// stop stays, and the next press may end it.
+        ResetElsewhere = 67,
     }
 }
 

@@ -22,7 +22,7 @@ pub use failure::{Failure, FailureKind, Remedy};
 pub use inputs::{Beside, NavigatorInput, NavigatorInputKind, NavigatorInputs, Sent, TextKind};
 pub use lager_orders::EventKind;
 pub use latency::{CommandLatency, Durations, PathLatency};
-pub use link::{ArmProfileState, BoardHealth, CalibratedSensor, Calibration, Health};
+pub use link::{BoardHealth, CalibratedSensor, Calibration, Health, Misfit, ProfileState};
 pub use log::{Joint, Thought, ThoughtKind};
 pub use map::{MapProduct, WarehouseMap};
 pub use mission::{Event, GoneGoods, GoneWhy, NotWaiting, Order, OrderQueue, WaitingOrder};

@@ -201,9 +201,12 @@ payload! {
         pub remedy: Tag<Remedy>,
         /// Who picks the goods up.
         pub pick: Tag<Pick>,
+        /// 1 = the robot stands on the delivery node, looks into the warehouse, sees tape, and has
+        /// not moved since somebody put it there. A change of it is told with the next state.
+        pub at_start: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 2],
+        pub reserved: u8,
     }
 }
 

@@ -75,6 +75,9 @@ coded! {
         ArmUnlimited = 12,
         /// The steering board is an original one, which knows the full speed only.
         FullSpeedOnly = 13,
+        /// A board does not obey the description of its robot (yet), so nobody knows which way it would
+        /// drive.
+        Undescribed = 14,
     }
 }
 

@@ -25,6 +25,8 @@ coded! {
         WordRemoved = 5,
         /// The file of the stop word was cut short or overwritten.
         WordDamaged = 6,
+        /// Somebody works on the boards with `lager board`.
+        BoardWork = 7,
     }
 }
 

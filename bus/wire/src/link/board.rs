@@ -12,7 +12,7 @@
 
 use super::handshake;
 use crate::decoder::Decoder;
-use crate::handshake::{Callsign, Handshake, ResetCause, SynAck, Version};
+use crate::handshake::{BUILD, Callsign, Handshake, ResetCause, SynAck, Version};
 use crate::packet::{PACKET_LENGTH, Packet, PacketId};
 use crate::payload::Payload;
 
@@ -81,6 +81,7 @@ impl BoardLink {
             reset,
             Version::One,
             self.was_up,
+            BUILD,
         ))
     }
 

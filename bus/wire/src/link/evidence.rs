@@ -13,7 +13,7 @@
 use core::time::Duration;
 
 use super::handshake;
-use crate::handshake::{Callsign, ResetCause, SynAck, Version};
+use crate::handshake::{BUILD, Callsign, ResetCause, SynAck, Version};
 use crate::packet::{PACKET_LENGTH, Packet, PacketId};
 
 /// How long no version-1 packet may have come before the Pi believes in an original board.
@@ -166,14 +166,17 @@ impl Syn {
 
 /// Whether an original SYN is really a version-1 SYN with a few wrong bits. Line faults can be
 /// steady, and then damaged SYNs are alike. With a damaged header, the same bytes may also be read
-/// as a SYN that starts elsewhere in the eleven bytes, so this compares every rotation.
+/// as a SYN that starts elsewhere in the eleven bytes, so this compares every rotation. The board
+/// has this source's build number or none.
 fn is_damaged_one(bytes: &[u8; PACKET_LENGTH]) -> bool {
     let signs = [Callsign::Sensor, Callsign::Steering];
     signs.into_iter().any(|sign| {
         let causes = ResetCause::ALL.iter();
-        let mut starts = causes.flat_map(|reset| [(*reset, false), (*reset, true)]);
-        starts.any(|(reset, was_up)| {
-            let whole = handshake(SynAck::Syn, sign, reset, Version::One, was_up);
+        let mut starts = causes
+            .flat_map(|reset| [(*reset, false), (*reset, true)])
+            .flat_map(|start| [(start, 0), (start, BUILD)]);
+        starts.any(|((reset, was_up), build)| {
+            let whole = handshake(SynAck::Syn, sign, reset, Version::One, was_up, build);
             (0..PACKET_LENGTH).any(|turn| {
                 let turned = whole.iter().cycle().skip(turn);
                 let wrong: u32 = turned

@@ -49,6 +49,9 @@ pub struct Up {
     pub rebooted: bool,
     /// Whether the board says that no link has been up since the board started.
     pub fresh: bool,
+    /// The build number of the board's image; 0 if it has none, and of a board that was found
+    /// running.
+    pub build: u16,
 }
 
 /// An event of the receiving end: something to send, or news.
@@ -316,6 +319,7 @@ impl HostLink {
             let board = (callsign, version, handshake.reset);
             let mut up = self.come_up(board, rebooted, now);
             up.fresh = version == Version::One && !handshake.was_up;
+            up.build = handshake.build;
             HostEvent::SendAck { up: Some(up) }
         })
     }
@@ -369,6 +373,7 @@ impl HostLink {
             reset,
             rebooted,
             fresh: false,
+            build: 0,
         }
     }
 }

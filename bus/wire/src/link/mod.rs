@@ -37,6 +37,7 @@ fn handshake(
     reset: ResetCause,
     version: Version,
     was_up: bool,
+    build: u16,
 ) -> [u8; PACKET_LENGTH] {
     let handshake = Handshake {
         kind,
@@ -44,6 +45,7 @@ fn handshake(
         version,
         reset,
         was_up,
+        build,
     };
     Packet {
         id: PacketId::default(),

@@ -28,14 +28,14 @@ impl HostTransmitter {
     /// board ignores the new bytes.
     pub fn syn(&self) -> [u8; PACKET_LENGTH] {
         let (sign, reset) = (Callsign::Raspi, ResetCause::Unknown);
-        handshake(SynAck::Syn, sign, reset, Version::One, false)
+        handshake(SynAck::Syn, sign, reset, Version::One, false, 0)
     }
 
     /// The answer to a board's SYN. Data packets after it are numbered from 0.
     pub fn ack(&mut self, version: Version) -> [u8; PACKET_LENGTH] {
         self.adopt(version);
         let (sign, reset) = (Callsign::Raspi, ResetCause::Unknown);
-        handshake(SynAck::Ack, sign, reset, version, false)
+        handshake(SynAck::Ack, sign, reset, version, false, 0)
     }
 
     /// Starts to send to a board that was found running and gets no ACK.

@@ -1,6 +1,6 @@
 //! The arm's profile: its rules, and how its values travel.
 
-use lager_wire::{ArmLimits, ArmProfile, SettingKey};
+use lager_wire::{ArmLimits, ArmProfile, Profile, SettingKey};
 
 use crate::sample::Noise;
 

@@ -71,6 +71,7 @@ fn the_decoder_gives_nothing_for_a_damaged_packet_alone() {
         version: Version::One,
         reset: ResetCause::PowerOn,
         was_up: false,
+        build: 1,
     });
     let steer = payloads()
         .into_iter()
@@ -136,9 +137,9 @@ fn bytes_without_a_meaning_must_be_zero() {
     let mut tried = 0;
     for payload in payloads() {
         let first_unused = match payload {
-            Payload::Handshake(_) => 3,
+            Payload::Handshake(_) => 6,
             Payload::Line(_) | Payload::Distance(_) => 1,
-            Payload::RawLine(_) => 2,
+            Payload::RawLine(_) | Payload::Reset(_) => 2,
             Payload::SteerCommand(_) => 4,
             Payload::Setting(_) => 6,
             Payload::SettingReply(_) | Payload::LineReading(_) => 5,

@@ -9,8 +9,8 @@
 use lager_wire::{
     ArmData, BoardStatus, Callsign, Centimetres, DecodeError, END, Handshake, Kind, LineBits,
     LineReading, LineState, MIN_LENGTH, PACKET_LENGTH, PAYLOAD_LENGTH, Packet, PacketId, Payload,
-    ResetCause, Setting, SettingKey, SettingReply, SettingStatus, SteerCommand, SteerData,
-    SteerFlags, SynAck, Version,
+    ResetCause, ResetOrder, Setting, SettingKey, SettingReply, SettingStatus, SteerCommand,
+    SteerData, SteerFlags, SynAck, Version,
 };
 
 use crate::sample::{packet, payloads};
@@ -62,6 +62,7 @@ fn syn(sign: Callsign, version: Version, reset: ResetCause) -> Payload {
         version,
         reset,
         was_up: false,
+        build: 0,
     })
 }
 
@@ -97,6 +98,7 @@ fn enums_have_the_originals_codes() {
         Kind::ArmData,
         Kind::BoardStatus,
         Kind::LineReading,
+        Kind::Reset,
     ];
     let signs = [
         Callsign::Error,
@@ -143,6 +145,7 @@ fn all_8_handshake_bytes() {
             version: Version::Original,
             reset: ResetCause::Unknown,
             was_up: false,
+            build: 0,
         };
         assert_eq!(handshake.byte(), byte);
         let sent = packet(0, Payload::Handshake(handshake));
@@ -187,15 +190,16 @@ fn version_one_packets() {
         version: Version::One,
         reset: ResetCause::Watchdog,
         was_up: true,
+        build: 0x1234,
     };
-    let cases: [(Packet, [u8; 11]); 13] = [
+    let cases: [(Packet, [u8; 11]); 14] = [
         (
             packet(0, syn(Callsign::Sensor, Version::One, ResetCause::PowerOn)),
             [0x00, 0x0b, 0x08, 1, 1, 0, 0, 0, 0, 0, 0x09],
         ),
         (
             packet(0, Payload::Handshake(asking_again)),
-            [0x00, 0x0b, 0x0c, 1, 4, 1, 0, 0, 0, 0, 0x30],
+            [0x00, 0x0b, 0x0c, 1, 4, 1, 0x34, 0x12, 0, 0, 0xdc],
         ),
         (
             packet(
@@ -306,6 +310,10 @@ fn version_one_packets() {
             ),
             [0xa9, 0x0b, 10, 120, 30, 200, 1, 0, 0, 0, 0xd0],
         ),
+        (
+            packet(2, Payload::Reset(ResetOrder::Loader)),
+            [0xb2, 0x0b, 2, 0xfd, 0, 0, 0, 0, 0, 0, 0x98],
+        ),
     ];
     for (packet, bytes) in cases {
         assert_eq!(packet.encode(Version::One), bytes, "{packet:?}");
@@ -376,7 +384,7 @@ fn an_error_shows_what_was_found() {
     let mut crc = good;
     crc[10] ^= 1;
     let mut kind = good;
-    kind[0] = 0xB0;
+    kind[0] = 0xC0;
     let mut length = good;
     length[1] = 10;
     let found = |bytes: &[u8]| Packet::decode(bytes, Version::One).unwrap_err();
@@ -387,7 +395,7 @@ fn an_error_shows_what_was_found() {
             found: good[10] ^ 1
         }
     );
-    assert_eq!(found(&kind), DecodeError::Kind { code: 11 });
+    assert_eq!(found(&kind), DecodeError::Kind { code: 12 });
     assert_eq!(found(&length), DecodeError::Length { found: 10 });
     assert_eq!(found(&good[..10]), DecodeError::Size { have: 10, need: 11 });
     assert_eq!(found(&[]), DecodeError::Size { have: 0, need: 4 });

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use lager_wire::link::{BoardEvent, BoardLink, HostEvent, HostLink, HostTransmitter, Up};
 use lager_wire::{
-    Callsign, Centimetres, PACKET_LENGTH, Packet, PacketId, Payload, ResetCause, SteerCommand,
-    Version,
+    BUILD, Callsign, Centimetres, PACKET_LENGTH, Packet, PacketId, Payload, ResetCause,
+    SteerCommand, Version,
 };
 
 use crate::line::{GAP_US, Harm, Line, board};
@@ -21,6 +21,7 @@ fn a_board_comes_up_at_its_first_syn() {
         reset: ResetCause::PowerOn,
         rebooted: false,
         fresh: true,
+        build: BUILD,
     };
     assert_eq!(
         line.host_events,

@@ -9,5 +9,6 @@ mod link;
 mod noise;
 mod original;
 mod reset;
+mod robot;
 mod sample;
 mod split;

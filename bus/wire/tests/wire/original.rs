@@ -75,6 +75,7 @@ fn an_original_board_comes_up_after_300_ms_of_syns_that_are_alike() {
                 reset: ResetCause::Unknown,
                 rebooted: false,
                 fresh: false,
+                build: 0,
             };
             assert_eq!(up, expected);
         }

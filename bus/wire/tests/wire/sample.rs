@@ -2,8 +2,8 @@
 
 use lager_wire::{
     ArmData, BoardStatus, Callsign, Centimetres, Handshake, LineBits, LineReading, LineState,
-    PACKET_LENGTH, Packet, PacketId, Payload, ResetCause, Setting, SettingKey, SettingReply,
-    SettingStatus, SteerCommand, SteerData, SteerFlags, SynAck, Version,
+    PACKET_LENGTH, Packet, PacketId, Payload, ResetCause, ResetOrder, Setting, SettingKey,
+    SettingReply, SettingStatus, SteerCommand, SteerData, SteerFlags, SynAck, Version,
 };
 
 /// Marsaglia's xorshift64*: the same bytes on every machine.
@@ -63,10 +63,12 @@ pub(crate) fn payloads() -> Vec<Payload> {
                     version: Version::One,
                     reset,
                     was_up: reset == ResetCause::BrownOut,
+                    build: reset.code().into(),
                 }));
             }
         }
     }
+    payloads.extend(ResetOrder::ALL.iter().copied().map(Payload::Reset));
     payloads.extend(LineState::ALL.iter().copied().map(Payload::Line));
     payloads.extend([0, 11, 37, 80, 255].map(|cm| Payload::Distance(Centimetres(cm))));
     payloads.extend([0, 0x7FF, 0x070, 0x555].map(|bits| Payload::RawLine(LineBits::new(bits))));
@@ -102,6 +104,8 @@ pub(crate) fn payloads() -> Vec<Payload> {
         (SettingKey::ArmTorqueLimit, 9, 1_023),
         (SettingKey::ArmDropWrist, 10, 0),
         (SettingKey::ArmProfile, 12, 255),
+        (SettingKey::SteeringDuty, 13, 140),
+        (SettingKey::Sensors, 14, 7),
     ] {
         payloads.push(Payload::Setting(Setting { key, seq, value }));
         for status in SettingStatus::ALL {

@@ -2,7 +2,7 @@
 
 use lager_avr::{clock, eeprom, reset, uart};
 use lager_control::{Board, SensorBoard};
-use lager_wire::ResetCause;
+use lager_wire::{ResetCause, ResetOrder};
 
 use crate::{converter, exde};
 
@@ -39,16 +39,20 @@ impl Board for SensorPins {
         self.cause
     }
 
+    fn reset(&mut self, order: ResetOrder) {
+        reset::on_order(order);
+    }
+
     fn kick_watchdog(&mut self) {
         reset::kick_watchdog();
     }
 
     fn eeprom_read(&self, address: u8) -> u8 {
-        eeprom::read(address)
+        eeprom::read(address.into())
     }
 
     fn eeprom_write(&mut self, address: u8, value: u8) -> bool {
-        eeprom::write(address, value)
+        eeprom::write(address.into(), value)
     }
 }
 

@@ -14,8 +14,11 @@ use avr_device::interrupt;
 use lager_avr::shared::StaticCell;
 use lager_avr::{clock, reset, uart};
 use lager_control::{SensorConfig, SensorUnit};
+use lager_wire::Callsign;
 
 use board::SensorPins;
+
+lager_avr::image_header!(Callsign::Sensor);
 
 static UNIT: StaticCell<SensorUnit> = StaticCell::new();
 

@@ -11,7 +11,7 @@ use lager_avr::register::{external, get, put, timer1};
 use lager_avr::shared::{Ring, Shared};
 use lager_exde::{Receiver, Timing};
 
-use crate::pins;
+use crate::{pins, servos};
 
 /// INT2 on a rising edge.
 const RISING: u8 = 0b11 << 4;
@@ -75,6 +75,7 @@ fn INT2() {
     };
     // SAFETY: this is an interrupt.
     unsafe { LISTENER.in_interrupt(hear) };
+    servos::take_in_interrupt();
 }
 
 #[avr_device::interrupt(atmega1284p)]

@@ -16,8 +16,11 @@ use avr_device::interrupt;
 use lager_avr::shared::StaticCell;
 use lager_avr::{clock, reset, uart};
 use lager_control::{SteeringConfig, SteeringUnit};
+use lager_wire::Callsign;
 
 use board::SteeringPins;
+
+lager_avr::image_header!(Callsign::Steering);
 
 static UNIT: StaticCell<SteeringUnit> = StaticCell::new();
 

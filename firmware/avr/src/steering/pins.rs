@@ -1,53 +1,47 @@
-//! The steering board's pin table. No other file knows a pin of this board (O7, P9).
-//!
-//! ```text
-//!   port   pin  name   way     use
-//!   A      0    ADC0   in      a quarter of the battery's voltage (30 k over 10 k)
-//!   B      0           in      ExDe data
-//!          1           out     ExDe return sync
-//!          2    INT2   in      ExDe sync
-//!          5-7                 ISP: MOSI, MISO, SCK
-//!   C      0           out     DIR of the left driver, low = forwards
-//!          1           out     DIR of the right driver, high = forwards: mirrored (W2)
-//!          2-5                 JTAG: TCK, TMS, TDO, TDI
-//!   D      0    RXD0   in      UART from the Pi
-//!          1    TXD0   out     UART to the Pi
-//!          2    RXD1   in      servos' wire, joined with TXD1, external pull-up (P10)
-//!          3    TXD1   in/out  servos' wire; drives it only while the board sends
-//!          6    OC2B   out     PWM of the right driver
-//!          7    OC2A   out     PWM of the left driver
-//! ```
-//!
-//! Every pin that is not listed is an input with pull-up.
+//! The steering board's pins as its program moves them. `lager-pins` has their table, and no other
+//! file of this program knows a pin (O7, P9).
 
-use lager_avr::register::{bit, clear, get, port_a, port_b, port_c, port_d, put, set};
+use lager_avr::register::{clear, get, port_a, port_b, port_c, port_d, put, set};
+use lager_pins::steering::{BATTERY, LEFT_DIR, LEFT_PWM, RIGHT_DIR, RIGHT_PWM, TABLE};
+use lager_pins::{Port, Start, steering};
 
 /// ADC input of the battery.
-pub(crate) const BATTERY_INPUT: u8 = 0;
+pub(crate) const BATTERY_INPUT: u8 = BATTERY.bit;
 
-const EXDE_DATA: u8 = bit(0);
-const EXDE_RETURN: u8 = bit(1);
-const EXDE_SYNC: u8 = bit(2);
-const ISP: u8 = 0b1110_0000;
-const LEFT_DIR: u8 = bit(0);
-const RIGHT_DIR: u8 = bit(1);
-const JTAG: u8 = 0b0011_1100;
-const SERVOS: u8 = bit(2) | bit(3);
-const RIGHT_PWM: u8 = bit(6);
-const LEFT_PWM: u8 = bit(7);
+const LEFT: u8 = LEFT_DIR.mask();
+const RIGHT: u8 = RIGHT_DIR.mask();
+const EXDE_DATA: u8 = steering::EXDE_DATA.mask();
+const EXDE_RETURN: u8 = steering::EXDE_RETURN.mask();
+
+/// The ports that the functions below use, and the outputs of timer 2, which cannot be moved.
+const _: () = {
+    assert!(matches!(BATTERY.port, Port::A));
+    assert!(matches!(steering::EXDE_DATA.port, Port::B));
+    assert!(matches!(steering::EXDE_RETURN.port, Port::B));
+    assert!(matches!(
+        (LEFT_DIR.port, RIGHT_DIR.port),
+        (Port::C, Port::C)
+    ));
+    assert!(matches!((LEFT_PWM.port, LEFT_PWM.bit), (Port::D, 7)));
+    assert!(matches!((RIGHT_PWM.port, RIGHT_PWM.bit), (Port::D, 6)));
+};
+
+const A: Start = Start::of(&TABLE, Port::A);
+const B: Start = Start::of(&TABLE, Port::B);
+const C: Start = Start::of(&TABLE, Port::C);
+const D: Start = Start::of(&TABLE, Port::D);
 
 /// Sets every pin's direction; the motors' pins are low.
 pub(crate) fn set_up() {
-    put(port_d().portd(), !(LEFT_PWM | RIGHT_PWM | SERVOS));
-    put(port_d().ddrd(), LEFT_PWM | RIGHT_PWM);
-    put(port_a().porta(), !bit(BATTERY_INPUT));
-    put(
-        port_b().portb(),
-        !(EXDE_DATA | EXDE_RETURN | EXDE_SYNC | ISP),
-    );
-    put(port_b().ddrb(), EXDE_RETURN);
-    put(port_c().portc(), !(LEFT_DIR | RIGHT_DIR | JTAG));
-    put(port_c().ddrc(), LEFT_DIR | RIGHT_DIR);
+    // From reset on every pin is an input.
+    const { assert!(A.direction == 0) };
+    put(port_d().portd(), D.port);
+    put(port_d().ddrd(), D.direction);
+    put(port_a().porta(), A.port);
+    put(port_b().portb(), B.port);
+    put(port_b().ddrb(), B.direction);
+    put(port_c().portc(), C.port);
+    put(port_c().ddrc(), C.direction);
 }
 
 /// Sets the drivers' DIR pins.
@@ -55,14 +49,14 @@ pub(crate) fn set_up() {
 pub(crate) fn set_directions(left_reverse: bool, right_reverse: bool) {
     let port = port_c();
     if left_reverse {
-        set(port.portc(), LEFT_DIR)
+        set(port.portc(), LEFT)
     } else {
-        clear(port.portc(), LEFT_DIR)
+        clear(port.portc(), LEFT)
     }
     if right_reverse {
-        clear(port.portc(), RIGHT_DIR)
+        clear(port.portc(), RIGHT)
     } else {
-        set(port.portc(), RIGHT_DIR)
+        set(port.portc(), RIGHT)
     }
 }
 

@@ -67,17 +67,20 @@ pub(crate) fn read() -> Option<u8> {
     RECEIVED.pop()
 }
 
+/// Takes every byte that waits. A byte comes every 160 cycles and three can wait, and this UART's
+/// interrupt is the chip's last, so a longer one before it takes them, too.
+#[inline(always)]
+pub(crate) fn take_in_interrupt() {
+    let uart = usart1();
+    while get(uart.ucsr1a()) & RXC != 0 {
+        RECEIVED.push(get(uart.udr1()));
+        clock::wake();
+    }
+}
+
 #[avr_device::interrupt(atmega1284p)]
 fn USART1_RX() {
-    // A byte comes every 160 cycles and three can wait, so this takes all that are there.
-    let uart = usart1();
-    loop {
-        RECEIVED.push(get(uart.udr1()));
-        if get(uart.ucsr1a()) & RXC == 0 {
-            break;
-        }
-    }
-    clock::wake();
+    take_in_interrupt();
 }
 
 #[avr_device::interrupt(atmega1284p)]

@@ -88,7 +88,12 @@ impl SteeringUnit {
     fn steer_data<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> SteerData {
         self.reports.data_due_us = now_us.wrapping_add(self.config.report_period_us);
         let (left, right) = self.wheels.pulses().mean(self.motors.unwrap_or(STILL));
-        let battery_decivolts = board.battery_decivolts();
+        // Without a divider the input floats, and 0 means that nothing is known.
+        let battery_decivolts = if self.divider {
+            board.battery_decivolts()
+        } else {
+            0
+        };
         self.supply.observe(battery_decivolts);
         let finish = self.reports.ends.told();
         SteerData {

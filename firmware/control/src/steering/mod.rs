@@ -22,6 +22,8 @@
 //! - Duties in orders and reports are meant for 11.1 V; the drivers get those with the same
 //!   voltage.
 //! - The board reports the servos' states before the end of the arm command that moved them.
+//! - Left, right and forward mean the robot's everywhere; only the orders to the two drivers know how
+//!   its motors are connected. When the Pi tells another way, the wheels stand until a new command.
 
 mod ends;
 mod messages;
@@ -29,7 +31,9 @@ mod orders;
 
 use ends::End;
 use lager_wire::link::BoardLink;
-use lager_wire::{ArmCommand, ArmProfile, COMMAND_AGE, Callsign, LineBits, LineState, ResetCause};
+use lager_wire::{
+    ArmCommand, ArmProfile, COMMAND_AGE, Callsign, LineBits, LineState, ResetCause, SteeringProfile,
+};
 
 use crate::arm::{Arm, ArmConfig, ArmEnd, Start};
 use crate::board::Motors;
@@ -39,9 +43,10 @@ use crate::load::Load;
 use crate::pd::{Gains, Pd};
 use crate::register::CommandRegister;
 use crate::sides::Sides;
-use crate::store::Store;
+use crate::store::{Place, Store};
 use crate::supply::Supply;
 use crate::time::{first, reached};
+use crate::told::{self, Told};
 use crate::wheels::{STILL, Wheels};
 use crate::{Board, EEPROM_POLL_US, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
 use messages::Reports;
@@ -61,6 +66,8 @@ pub struct SteeringConfig {
     pub line_age_limit_us: u32,
     /// The board gives a packet up after this silence inside it, in microseconds.
     pub gap_us: u32,
+    /// What the board obeys until the Pi has told it its robot, which it keeps in EEPROM.
+    pub robot: SteeringProfile,
     /// The arm's numbers.
     pub arm: ArmConfig,
 }
@@ -74,6 +81,7 @@ impl Default for SteeringConfig {
             status_period_us: 500_000,
             line_age_limit_us: 100_000,
             gap_us: PACKET_GAP_US,
+            robot: SteeringProfile::default(),
             arm: ArmConfig::default(),
         }
     }
@@ -125,8 +133,12 @@ pub struct SteeringUnit {
     arm: Arm,
     arm_waiting: Option<ArmOrder>,
     arm_running: Option<ArmOrder>,
-    /// The profile whose values the Pi is sending; not yet in force.
-    profile: [u16; ArmProfile::VALUES],
+    /// The arm's profile that the Pi is sending.
+    told_arm: Told<ArmProfile>,
+    /// The description of the robot that the Pi is sending.
+    told: Told<SteeringProfile>,
+    /// Whether the battery's voltage is at the board's input.
+    divider: bool,
     motors: Option<Motors>,
     /// The duties that the drivers got for `motors`.
     at_pins: Option<Motors>,
@@ -137,6 +149,8 @@ pub struct SteeringUnit {
     load: Load,
     /// The gains P and D in EEPROM.
     store: Store<2>,
+    /// The robot in EEPROM.
+    robot_store: Store<12>,
 }
 
 impl SteeringUnit {
@@ -145,8 +159,12 @@ impl SteeringUnit {
     pub fn new(board: &impl Board, config: SteeringConfig) -> Self {
         let now_us = board.now_us();
         let reset = board.reset_cause();
-        let (store, kept) = Store::load(board);
+        let (store, kept) = Store::load(board, Place::Settings);
         let gains = kept.map_or(config.gains, |[p, d]| Gains { p, d });
+        let (robot_store, kept) = Store::load(board, Place::Robot);
+        let robot = kept
+            .and_then(|kept| told::obeyed(&kept))
+            .unwrap_or(config.robot);
         Self {
             reset,
             link: BoardLink::new(Callsign::Steering, reset, config.gap_us),
@@ -162,11 +180,13 @@ impl SteeringUnit {
                 correction: 0,
                 fresh_since_us: None,
             },
-            wheels: Wheels::new(),
+            wheels: Wheels::new(robot.wheels),
             arm: Arm::new(config.arm, now_us),
             arm_waiting: None,
             arm_running: None,
-            profile: config.arm.profile.values(),
+            told_arm: Told::new(&config.arm.profile),
+            told: Told::new(&robot),
+            divider: robot.divider,
             motors: None,
             at_pins: None,
             round: 0,
@@ -174,6 +194,7 @@ impl SteeringUnit {
             reports: Reports::new(now_us),
             load: Load::new(now_us),
             store,
+            robot_store,
             config,
         }
     }
@@ -212,6 +233,7 @@ impl SteeringUnit {
         self.report(board, now_us);
         self.follow(board, now_us);
         self.store.poll(board);
+        self.robot_store.poll(board);
         true
     }
 
@@ -335,6 +357,7 @@ impl SteeringUnit {
         self.motors = Some(motors);
         let at_pins = self.supply.at_pins(motors, self.round);
         let at_pins = self.wheels.pulses().at_pins(at_pins);
+        let at_pins = self.wheels.at_drivers(at_pins);
         if self.at_pins != Some(at_pins) {
             self.at_pins = Some(at_pins);
             board.set_motors(at_pins.0, at_pins.1);
@@ -352,9 +375,7 @@ impl SteeringUnit {
             .link
             .us_to_syn(now_us)
             .map(|us| now_us.wrapping_add(us));
-        let save_us = self
-            .store
-            .is_saving()
+        let save_us = (self.store.is_saving() || self.robot_store.is_saving())
             .then(|| now_us.wrapping_add(EEPROM_POLL_US));
         for other_us in [
             syn_us.or_else(|| self.report_due_us(now_us)),

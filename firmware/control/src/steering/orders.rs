@@ -5,19 +5,20 @@
 //!                 |           |                 '-> arm: only in standby, after the one before
 //!                 |           '-- repeated: renews its age
 //!                 '-> setting --> gain, answered
-//!                             '-> arm's profile: value by value, answered --> in force as a whole
+//!                             '-> arm, robot: value by value, answered --> in force as a whole
 //! ```
 
 use lager_wire::link::BoardEvent;
 use lager_wire::{
-    ArmProfile, Command, Payload, Setting, SettingKey, SettingReply, SettingStatus, SteerCommand,
-    WheelCommand,
+    Command, Payload, Profile, Setting, SettingKey, SettingReply, SettingStatus, SteerCommand,
+    SteeringProfile, WheelCommand,
 };
 
 use super::ends::{End, Finish};
 use super::{ArmOrder, SteeringUnit};
 use crate::register::Receipt;
-use crate::{MOST_BYTES, SteeringBoard};
+use crate::told::{self, Answer};
+use crate::{MOST_BYTES, Motor, SteeringBoard};
 
 impl SteeringUnit {
     pub(super) fn listen<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
@@ -32,8 +33,12 @@ impl SteeringUnit {
                 Some(BoardEvent::Packet(packet)) => match packet.payload {
                     Payload::SteerCommand(command) => self.receive(command, now_us),
                     Payload::Setting(setting) => {
-                        let reply = self.set(setting);
+                        let reply = self.set(setting, now_us);
                         self.reports.replies.push(reply);
+                    }
+                    Payload::Reset(order) => {
+                        board.set_motors(Motor::OFF, Motor::OFF);
+                        board.reset(order);
                     }
                     _ => self.count_refused(),
                 },
@@ -108,20 +113,54 @@ impl SteeringUnit {
         self.refused = self.refused.saturating_add(1);
     }
 
-    fn set(&mut self, setting: Setting) -> SettingReply {
+    fn set(&mut self, setting: Setting, now_us: u32) -> SettingReply {
         let (value, status) = match setting.key {
             SettingKey::GainP | SettingKey::GainD => self.set_gain(setting),
-            SettingKey::ArmProfile => self.put_profile_in_force(setting.value),
-            key => match ArmProfile::index(key) {
-                Some(index) => self.put_aside(index, setting.value),
-                None => (0, SettingStatus::NotHere),
-            },
+            _ => self
+                .hear_arm(setting)
+                .unwrap_or_else(|| self.hear_robot(setting, now_us)),
         };
         SettingReply {
             key: setting.key,
             seq: setting.seq,
             value,
             status,
+        }
+    }
+
+    /// Takes in a value of the arm's profile, which counts once it is whole.
+    fn hear_arm(&mut self, setting: Setting) -> Option<Answer> {
+        let (answer, profile) = self.told_arm.hear(setting, self.arm.profile())?;
+        if let Some(profile) = profile {
+            self.arm.set_profile(profile);
+        }
+        Some(answer)
+    }
+
+    /// Takes in what the Pi tells of the robot, which counts once it is whole. If it is not what was
+    /// in force, the wheels' command ends: it was given for another robot.
+    fn hear_robot(&mut self, setting: Setting, now_us: u32) -> Answer {
+        let robot = self.robot();
+        let Some((answer, told)) = self.told.hear(setting, &robot) else {
+            return (0, SettingStatus::NotHere);
+        };
+        if let Some(told) = told
+            && told != robot
+        {
+            self.break_off(now_us);
+            self.wheels.set_profile(told.wheels);
+            self.divider = told.divider;
+        }
+        if let Some(told) = told {
+            self.robot_store.save(told::kept(&told.told()));
+        }
+        answer
+    }
+
+    fn robot(&self) -> SteeringProfile {
+        SteeringProfile {
+            wheels: *self.wheels.profile(),
+            divider: self.divider,
         }
     }
 
@@ -138,26 +177,5 @@ impl SteeringUnit {
         self.line.pd.set_gains(gains);
         self.store.save([gains.p, gains.d]);
         (setting.value, SettingStatus::Accepted)
-    }
-
-    /// Keeps one value of the profile that the Pi is sending; it is not in force yet.
-    fn put_aside(&mut self, index: usize, value: i16) -> (i16, SettingStatus) {
-        match u16::try_from(value) {
-            Ok(told) => {
-                self.profile[index] = told;
-                (value, SettingStatus::Accepted)
-            }
-            Err(_) => (self.profile[index].cast_signed(), SettingStatus::OutOfRange),
-        }
-    }
-
-    /// The Pi has sent all values. Obeys the profile if it arrived whole and an arm can obey it.
-    fn put_profile_in_force(&mut self, check: i16) -> (i16, SettingStatus) {
-        if check == ArmProfile::check(&self.profile) && ArmProfile::is_sound(&self.profile) {
-            self.arm.set_profile(ArmProfile::from_values(&self.profile));
-            return (check, SettingStatus::Accepted);
-        }
-        let in_force = ArmProfile::check(&self.arm.profile().values());
-        (in_force, SettingStatus::OutOfRange)
     }
 }

@@ -14,7 +14,9 @@ pub mod servos;
 use std::collections::VecDeque;
 
 use lager_control::{Board, EEPROM_LENGTH, Motor, SteeringBoard, SteeringConfig, SteeringUnit};
-use lager_wire::{BoardStatus, Payload, ResetCause, Setting, SettingKey, SteerCommand, SteerData};
+use lager_wire::{
+    BoardStatus, Payload, ResetCause, ResetOrder, Setting, SettingKey, SteerCommand, SteerData,
+};
 pub use pi::{Pi, Uart};
 pub use sensor::SensorBench;
 use servos::Servos;
@@ -34,6 +36,8 @@ pub struct SteeringPins {
     pub receiving: bool,
     pub exde_errors: u8,
     pub servos: Servos,
+    /// Every order to reset, and the motors at that time.
+    pub resets: Vec<(ResetOrder, Option<(Motor, Motor)>)>,
     pub kicks: usize,
     pub eeprom: [u8; EEPROM_LENGTH as usize],
     /// Every step takes the processor this long.
@@ -55,6 +59,10 @@ impl Board for SteeringPins {
     }
     fn reset_cause(&self) -> ResetCause {
         ResetCause::BrownOut
+    }
+    fn reset(&mut self, order: ResetOrder) {
+        self.resets
+            .push((order, self.motor_log.last().map(|(_, motors)| *motors)));
     }
     fn kick_watchdog(&mut self) {
         self.kicks += 1;
@@ -121,6 +129,7 @@ impl Bench {
             receiving: false,
             exde_errors: 0,
             servos,
+            resets: Vec::new(),
             kicks: 0,
             eeprom: [255; EEPROM_LENGTH as usize],
             step_us: 0,

@@ -1,7 +1,7 @@
 //! A sensor board on the bench.
 
 use lager_control::{Board, EEPROM_LENGTH, SensorBoard, SensorConfig, SensorUnit};
-use lager_wire::{Payload, ResetCause, Setting, SettingKey};
+use lager_wire::{Payload, ResetCause, ResetOrder, Setting, SettingKey};
 
 use super::{Pi, Uart, ahead};
 
@@ -20,6 +20,8 @@ pub struct SensorPins {
     pub words: Vec<(u32, u16)>,
     /// How long a word takes to send, in microseconds.
     pub word_us: u32,
+    /// Every order to reset.
+    pub resets: Vec<ResetOrder>,
     pub kicks: usize,
     pub eeprom: [u8; EEPROM_LENGTH as usize],
 }
@@ -39,6 +41,9 @@ impl Board for SensorPins {
     }
     fn reset_cause(&self) -> ResetCause {
         ResetCause::Watchdog
+    }
+    fn reset(&mut self, order: ResetOrder) {
+        self.resets.push(order);
     }
     fn kick_watchdog(&mut self) {
         self.kicks += 1;
@@ -95,6 +100,7 @@ impl SensorBench {
             answered: false,
             words: Vec::new(),
             word_us: 300,
+            resets: Vec::new(),
             kicks: 0,
             eeprom: [255; EEPROM_LENGTH as usize],
         };

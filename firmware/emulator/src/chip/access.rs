@@ -35,6 +35,18 @@ impl Chip {
         }
     }
 
+    /// Writes RAM from `address` on.
+    pub fn set_memory(&self, address: u16, bytes: &[u8]) {
+        for (place, byte) in (usize::from(address)..).zip(bytes) {
+            // SAFETY: `ramend` bounds the data space; nothing beyond it is written.
+            unsafe {
+                if place <= usize::from((*self.avr).ramend) {
+                    *(*self.avr).data.add(place) = *byte;
+                }
+            }
+        }
+    }
+
     /// The stack pointer.
     pub fn stack_pointer(&self) -> u16 {
         u16::from_le_bytes([self.register(0x5D), self.register(0x5E)])

@@ -19,6 +19,7 @@ use std::rc::Rc;
 use simavr_ffi as ffi;
 
 use super::queue::Event;
+use super::run::WDRF;
 use super::serial::find;
 use super::{Chip, EEPROM, FREQUENCY, chip, register};
 
@@ -28,8 +29,6 @@ pub(super) const WATCHDOG_VECTOR: u8 = 8;
 /// Bits of WDTCSR.
 const WDIF: u8 = 0x80;
 const WDE: u8 = 0x08;
-/// Watchdog reset flag in MCUSR.
-const WDRF: u8 = 0x08;
 /// Bits of EECR.
 const EERE: u8 = 0x01;
 const EEPE: u8 = 0x02;
@@ -206,6 +205,7 @@ impl Chip {
             let life = own.eeprom_life.get() + 1;
             own.eeprom_life.set(life);
             own.eeprom_busy.set(true);
+            self.flash.empty_buffer();
             self.set_register(register::EECR, self.register(register::EECR) | EEPE);
             self.schedule(self.cycle() + EEPROM_WRITE, Event::EepromDone { life });
         }

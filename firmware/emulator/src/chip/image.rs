@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-/// Bytes of flash of the ATmega1284P.
-pub const FLASH: usize = 128 * 1024;
+use super::{FLASH, Fuses};
+
 /// Bytes of EEPROM of the ATmega1284P.
 pub const EEPROM: usize = 4 * 1024;
 
@@ -16,6 +16,9 @@ pub const EEPROM: usize = 4 * 1024;
 const RAM_ORIGIN: usize = 0x80_0000;
 /// The linker gives addresses from here on to the EEPROM's content.
 const EEPROM_ORIGIN: usize = 0x81_0000;
+/// The linker gives these addresses to the fuses and to the lock bits.
+const FUSE_ORIGIN: usize = 0x82_0000;
+const LOCK_ORIGIN: usize = 0x83_0000;
 const MACHINE_AVR: u16 = 83;
 const LOAD: u32 = 1;
 
@@ -54,6 +57,7 @@ pub enum ImageError {
 pub struct Image {
     pub(crate) flash: Vec<(usize, Vec<u8>)>,
     pub(crate) eeprom: Vec<(usize, Vec<u8>)>,
+    pub(crate) fuses: Option<Fuses>,
     rustc: String,
 }
 
@@ -68,6 +72,26 @@ impl Image {
             source,
         })?;
         Self::parse(&bytes, path)
+    }
+
+    /// An image of these bytes, the first one at address 0, as a programmer has read them.
+    pub fn from_bytes(bytes: Vec<u8>) -> Self {
+        Self {
+            flash: vec![(0, bytes)],
+            eeprom: Vec::new(),
+            fuses: None,
+            rustc: String::new(),
+        }
+    }
+
+    /// This image and another one in the same chip, such as an application and its boot loader. The
+    /// fuses are those of this image, if it has any.
+    #[must_use]
+    pub fn with(mut self, other: &Self) -> Self {
+        self.flash.extend_from_slice(&other.flash);
+        self.eeprom.extend_from_slice(&other.eeprom);
+        self.fuses = self.fuses.or(other.fuses);
+        self
     }
 
     /// How many bytes of flash the image fills.
@@ -89,6 +113,7 @@ impl Image {
         let mut image = Self {
             flash: Vec::new(),
             eeprom: Vec::new(),
+            fuses: None,
             rustc: compiler(bytes),
         };
         let cut_off = || ImageError::CutOff(path.to_owned());
@@ -129,7 +154,16 @@ impl Image {
                 address,
             });
         }
-        // A programmer does not write RAM; fuses, lock bits and signature need other commands.
+        let mut fuses = self.fuses.unwrap_or_default();
+        match (address, content) {
+            (FUSE_ORIGIN, &[low, high, extended]) => {
+                (fuses.low, fuses.high, fuses.extended) = (low, high, extended);
+            }
+            (LOCK_ORIGIN, &[lock]) => fuses.lock = lock,
+            // A programmer does not write RAM and signature.
+            _ => return Ok(()),
+        }
+        self.fuses = Some(fuses);
         Ok(())
     }
 }
@@ -196,6 +230,25 @@ mod tests {
         let mut bytes = elf(MACHINE_AVR, 0);
         bytes.extend(b"\0rustc version 1.96.0-nightly (ac68faa20 2026-05-25)\0");
         assert_eq!(parse(&bytes).unwrap().rustc(), "1.96.0-nightly");
+    }
+
+    #[test]
+    fn an_image_tells_its_fuses() {
+        assert_eq!(parse(&elf(MACHINE_AVR, 0)).unwrap().fuses, None);
+        let mut image = parse(&elf(MACHINE_AVR, 0)).unwrap();
+        let path = Path::new("image.elf");
+        image.place(FUSE_ORIGIN, &[0xF7, 0x92, 0xFC], path).unwrap();
+        image.place(LOCK_ORIGIN, &[0xEF], path).unwrap();
+        let fuses = Fuses {
+            low: 0xF7,
+            high: 0x92,
+            extended: 0xFC,
+            lock: 0xEF,
+        };
+        assert_eq!(image.fuses, Some(fuses));
+        let application = parse(&elf(MACHINE_AVR, 0x100)).unwrap();
+        let both = application.with(&image);
+        assert_eq!((both.fuses, both.flash.len()), (Some(fuses), 2));
     }
 
     #[test]

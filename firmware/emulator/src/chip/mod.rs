@@ -14,6 +14,7 @@
 //!   watchdog never resets with I clear   it does, at the second time-out           `corrections`
 //!   enabling an interrupt whose flag     raises it                                 `corrections`
 //!     is set does nothing
+//!   SPM writes at once, anywhere        4.5 ms, boot section only, lock bits     `flash`
 //! ```
 //!
 //! A caller drives a chip by [`Chip::run_until`]; the chip never waits and reads no clock. Its
@@ -23,6 +24,8 @@
 
 mod access;
 mod corrections;
+mod flash;
+mod fuses;
 mod handlers;
 mod image;
 mod interrupts;
@@ -39,7 +42,8 @@ use std::rc::Rc;
 
 use simavr_ffi as ffi;
 
-pub use image::{EEPROM, FLASH, Image, ImageError};
+pub use fuses::{FLASH, Fuses};
+pub use image::{EEPROM, Image, ImageError};
 pub use interrupts::{InterruptStatistics, VectorStatistics};
 pub use pins::{Level, Pin, Wire, wire};
 pub use serial::Sent;
@@ -63,6 +67,8 @@ pub enum ResetLine {
     External,
     /// The supply voltage fell.
     BrownOut,
+    /// The watchdog.
+    Watchdog,
 }
 
 /// Addresses of the ATmega1284P's registers that this crate uses, in the data space.
@@ -77,6 +83,8 @@ pub(crate) mod register {
     pub(crate) const EICRA: u8 = 0x69;
     pub(crate) const EECR: u8 = 0x3F;
     pub(crate) const MCUSR: u8 = 0x54;
+    pub(crate) const SPMCSR: u8 = 0x57;
+    pub(crate) const RAMPZ: u8 = 0x5B;
     pub(crate) const WDTCSR: u8 = 0x60;
     pub(crate) const ADCSRA: u8 = 0x7A;
     pub(crate) const TCCR2A: u8 = 0xB0;
@@ -104,6 +112,7 @@ struct Original {
 pub struct Chip {
     avr: *mut ffi::avr_t,
     peripherals: Peripherals,
+    flash: flash::Flash,
     reset_hook: Cell<*mut ffi::avr_io_t>,
     queue: Queue,
     ports: Ports,
@@ -132,7 +141,7 @@ unsafe extern "C" {
 }
 
 impl Chip {
-    /// A chip with `image` in its flash. Power comes on at cycle 0; the program starts `delay`
+    /// A chip with `image` in its flash, and with its fuses. Power comes on at cycle 0; the program starts `delay`
     /// cycles after the usual start-up time. `noise` fills its RAM, which has random content after
     /// power-on.
     ///
@@ -140,6 +149,7 @@ impl Chip {
     /// simavr was built without this chip.
     pub fn new(image: &Image, delay: u64, noise: u64) -> Result<Rc<Self>, ImageError> {
         silence();
+        let fuses = image.fuses.unwrap_or_default();
         // SAFETY: the name is a C string; the result is checked before use.
         let avr = unsafe { ffi::avr_make_mcu_by_name(c"atmega1284p".as_ptr()) };
         if avr.is_null() {
@@ -152,11 +162,13 @@ impl Chip {
             (*avr).vcc = 5_000;
             (*avr).avcc = 5_000;
             (*avr).aref = 5_000;
+            (*avr).reset_pc = fuses.start();
             (*avr).set_log(0);
         }
         let chip = Rc::new(Self {
             avr,
             peripherals: Peripherals::of(avr),
+            flash: flash::Flash::of(avr, fuses),
             reset_hook: Cell::new(core::ptr::null_mut()),
             queue: Queue::default(),
             ports: Ports::of(avr),
@@ -180,6 +192,7 @@ impl Chip {
         chip.hook_serial();
         chip.hook_interrupts();
         chip.hook_corrections();
+        chip.hook_flash();
         chip.begin_reset(delay);
         Ok(chip)
     }

@@ -34,6 +34,12 @@ pub enum Level {
     High,
 }
 
+impl From<lager_pins::Pin> for Pin {
+    fn from(pin: lager_pins::Pin) -> Self {
+        Self::new(pin.port.letter(), pin.bit)
+    }
+}
+
 impl Pin {
     /// A pin by its datasheet name, as `Pin::new('D', 5)` for PD5.
     pub const fn new(port: char, bit: u8) -> Self {
@@ -133,7 +139,13 @@ impl Wire {
 }
 
 /// Joins two chips' pins.
-pub fn wire(from: &Rc<Chip>, source: Pin, to: &Rc<Chip>, target: Pin) -> Rc<Wire> {
+pub fn wire(
+    from: &Rc<Chip>,
+    source: impl Into<Pin>,
+    to: &Rc<Chip>,
+    target: impl Into<Pin>,
+) -> Rc<Wire> {
+    let (source, target): (Pin, Pin) = (source.into(), target.into());
     let wire = Rc::new(Wire {
         to: Rc::downgrade(to),
         from: Rc::downgrade(from),

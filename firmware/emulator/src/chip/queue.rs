@@ -22,6 +22,10 @@ pub(super) enum Event {
     WatchdogAgain { life: u32 },
     /// The EEPROM has written its byte.
     EepromDone { life: u32 },
+    /// A command to SPM is no longer obeyed.
+    SpmExpired { life: u32 },
+    /// A page of the flash is erased or written.
+    FlashDone { life: u32 },
     /// An alarm that somebody outside has set.
     Alarm { tag: u32 },
 }

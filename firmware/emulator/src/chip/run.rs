@@ -27,6 +27,12 @@ const ENTRY: u64 = 4;
 /// Additional cycles if the core slept.
 const ENTRY_FROM_SLEEP: u64 = 4;
 
+/// Bits of MCUSR.
+const PORF: u8 = 0x01;
+const EXTRF: u8 = 0x02;
+const BORF: u8 = 0x04;
+pub(super) const WDRF: u8 = 0x08;
+
 impl Chip {
     /// Runs until the cycle count is at least `horizon`, and at most one instruction further.
     pub fn run_until(&self, horizon: u64) {
@@ -52,7 +58,7 @@ impl Chip {
         if let Some(until) = self.held_until.get() {
             return until.min(self.queue.next()).max(now);
         }
-        if self.core_state() == ffi::cpu_Running as c_int {
+        if self.core_works() {
             return now;
         }
         // SAFETY: the head of simavr's list of timers is null or a slot inside the chip.
@@ -67,19 +73,27 @@ impl Chip {
         timer.min(self.queue.next()).max(now)
     }
 
-    /// Resets the chip now, by its reset pin, its supply or power.
+    /// Resets the chip now, by its reset pin, its supply, power or its watchdog.
     pub fn reset(&self, line: ResetLine) {
         let flag = match line {
-            ResetLine::Power => 0x01,
-            ResetLine::External => 0x02,
-            ResetLine::BrownOut => 0x04,
+            ResetLine::Power => PORF,
+            ResetLine::External => EXTRF,
+            ResetLine::BrownOut => BORF,
+            ResetLine::Watchdog => WDRF,
         };
         self.reset_with(flag);
     }
 
-    /// Resets the chip and sets this flag in MCUSR.
+    /// Resets the chip and sets this flag in MCUSR; power clears the others.
     pub(super) fn reset_with(&self, flag: u8) {
-        self.set_register(register::MCUSR, self.register(register::MCUSR) | flag);
+        if flag & (PORF | BORF) != 0 {
+            self.tear_page();
+        }
+        let kept = match flag {
+            PORF => 0,
+            _ => self.register(register::MCUSR),
+        };
+        self.set_register(register::MCUSR, kept | flag);
         self.reset_core();
         self.resets.set(self.resets.get() + 1);
         self.begin_reset(0);
@@ -118,6 +132,7 @@ impl Chip {
         self.interrupts.forget(self.cycle());
         self.release_peripherals();
         self.release_ports();
+        self.release_flash();
         pins::release(&self.wires.borrow());
         self.tell_watcher();
     }
@@ -152,12 +167,12 @@ impl Chip {
         }
         // A timer may have put an event into our queue.
         let limit = horizon.min(self.queue.next());
-        if self.core_state() == ffi::cpu_Running as c_int {
+        if self.core_works() {
             if !self.enter_interrupt() {
                 self.run_instructions(to_timer.min(limit.saturating_sub(now)));
             }
         } else {
-            // Asleep or crashed: only time passes, also for the watchdog.
+            // Asleep, crashed or halted by SPM: only time passes, also for the watchdog.
             let next = now + to_timer.max(1);
             let then = next.min(limit).max(now);
             self.set_cycle(then);
@@ -226,6 +241,8 @@ impl Chip {
             Event::Received { usart, life } => self.frame_received(usart, life),
             Event::WatchdogAgain { life } => self.watchdog_again(life),
             Event::EepromDone { life } => self.eeprom_done(life),
+            Event::SpmExpired { life } => self.spm_expired(life),
+            Event::FlashDone { life } => self.flash_done(life),
             Event::Alarm { tag } => {
                 if let Some(action) = self.on_alarm.borrow().as_ref() {
                     action(tag, now);
@@ -255,6 +272,11 @@ impl Chip {
     fn set_cycle(&self, cycle: u64) {
         // SAFETY: a plain field of a living chip.
         unsafe { (*self.avr).cycle = cycle };
+    }
+
+    /// Whether the core executes instructions.
+    fn core_works(&self) -> bool {
+        self.core_state() == ffi::cpu_Running as c_int && !self.flash.is_halting()
     }
 
     fn core_state(&self) -> c_int {

@@ -1,10 +1,12 @@
 //! Translates the boards' pins: multiplexer and ranger to readings, motor pins to duties.
 //!
-//! It mirrors the pin tables of `firmware/avr`.
+//! The pins are those of `lager-pins`. That the drivers are mirrored is written here once more, as a
+//! driver has it, so that a board that turns a wheel the wrong way is found out.
 
 use core::cell::{Cell, RefCell};
 use std::rc::Rc;
 
+use lager_pins::{sensor, steering};
 use lager_plant::World;
 
 use super::Epoch;
@@ -13,25 +15,9 @@ use crate::chip::{Chip, Level, Pin, register};
 /// Full scale of both boards' converters, in millivolts.
 const REFERENCE: u32 = 5_000;
 
-/// Address pins of the line multiplexer, bit 0 first; its enable pin is active low.
-const ADDRESS: [Pin; 4] = [
-    Pin::new('B', 0),
-    Pin::new('B', 1),
-    Pin::new('B', 2),
-    Pin::new('B', 3),
-];
-const ENABLE: Pin = Pin::new('B', 4);
 /// Channels of the sensor board's converter.
-const LINE: u8 = 0;
-const RANGER: u8 = 1;
-
-/// DIR pins of the left and the right driver. The drivers are mirrored: forwards is low on the left
-/// and high on the right.
-const LEFT_DIR: Pin = Pin::new('C', 0);
-const RIGHT_DIR: Pin = Pin::new('C', 1);
-/// PWM pins of the left and the right driver.
-const LEFT_PWM: Pin = Pin::new('D', 7);
-const RIGHT_PWM: Pin = Pin::new('D', 6);
+const LINE: u8 = sensor::LINE.bit;
+const RANGER: u8 = sensor::RANGER.bit;
 
 /// The input of a conversion of the sensor board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,12 +110,12 @@ pub(super) fn connect_inputs(
 
 /// The multiplexer's channel; `None` if it is off.
 fn selected(board: &Chip) -> Option<u8> {
-    if ENABLE.level(board) != Level::Low {
+    if Pin::from(sensor::ENABLE).level(board) != Level::Low {
         return None;
     }
-    let bit = |pin: &Pin| u8::from(pin.level(board) == Level::High);
-    let channel = ADDRESS
-        .iter()
+    let bit = |pin: lager_pins::Pin| u8::from(Pin::from(pin).level(board) == Level::High);
+    let channel = sensor::ADDRESS
+        .into_iter()
         .rev()
         .fold(0, |address, pin| address << 1 | bit(pin));
     Some(channel)
@@ -215,12 +201,18 @@ fn told(board: &Chip) -> [i16; 2] {
             _ => 255,
         }
     };
-    let left = duty(LEFT_PWM, register::OCR2A, modes >> 6);
-    let right = duty(RIGHT_PWM, register::OCR2B, modes >> 4 & 3);
+    let left = duty(steering::LEFT_PWM.into(), register::OCR2A, modes >> 6);
+    let right = duty(steering::RIGHT_PWM.into(), register::OCR2B, modes >> 4 & 3);
     let signed = |duty: i16, forwards: bool| if forwards { duty } else { -duty };
     [
-        signed(left, LEFT_DIR.level(board) != Level::High),
-        signed(right, RIGHT_DIR.level(board) == Level::High),
+        signed(
+            left,
+            Pin::from(steering::LEFT_DIR).level(board) != Level::High,
+        ),
+        signed(
+            right,
+            Pin::from(steering::RIGHT_DIR).level(board) == Level::High,
+        ),
     ]
 }
 

@@ -21,12 +21,13 @@ use core::cell::{Cell, Ref, RefCell, RefMut};
 use core::time::Duration;
 use std::rc::Rc;
 
+use lager_pins::{sensor as at_sensor, steering as at_steering};
 use lager_plant::arm::RESTING;
 use lager_plant::noise::{Noise, START_STREAM};
 use lager_plant::{Make, Snapshot, Warehouse, WarehouseError, World, WorldState};
 use thiserror::Error;
 
-use crate::chip::{Chip, FREQUENCY, Image, ImageError, Pin, ResetLine, Wire, wire};
+use crate::chip::{Chip, FREQUENCY, Image, ImageError, ResetLine, Wire, wire};
 
 pub use boards::{Conversion, Input, MotorChange};
 pub use servos::{ServoByte, ServoWire};
@@ -34,8 +35,8 @@ pub use servos::{ServoByte, ServoWire};
 use boards::{Motors, SensorInputs};
 use line::PiLine;
 
-/// The voltage divider between the battery and the board's input.
-const BATTERY_DIVIDER: u32 = 4;
+/// The steering board's channel of the battery.
+const BATTERY: u8 = at_steering::BATTERY.bit;
 /// The boards start at most this many cycles apart: 5 ms.
 const START_SPREAD: u64 = FREQUENCY / 200;
 
@@ -163,15 +164,30 @@ impl Rig {
         let inputs = boards::connect_inputs(&sensor, &world, &epoch);
         let battery = Rc::clone(&world);
         steering.on_conversion(move |channel, _| match channel {
-            0 => (battery.borrow().battery_volts() * 1_000.0) as u32 / BATTERY_DIVIDER,
+            BATTERY => (battery.borrow_mut().battery_input_volts() * 1_000.0) as u32,
             _ => 0,
         });
         let motors = boards::connect_motors(&steering, &world, &epoch);
         let servos = servos::connect(&steering, &world, &epoch);
         let exde = ExDe {
-            data: wire(&sensor, Pin::new('D', 5), &steering, Pin::new('B', 0)),
-            sync: wire(&sensor, Pin::new('D', 4), &steering, Pin::new('B', 2)),
-            return_sync: wire(&steering, Pin::new('B', 1), &sensor, Pin::new('D', 2)),
+            data: wire(
+                &sensor,
+                at_sensor::EXDE_DATA,
+                &steering,
+                at_steering::EXDE_DATA,
+            ),
+            sync: wire(
+                &sensor,
+                at_sensor::EXDE_SYNC,
+                &steering,
+                at_steering::EXDE_SYNC,
+            ),
+            return_sync: wire(
+                &steering,
+                at_steering::EXDE_RETURN,
+                &sensor,
+                at_sensor::EXDE_RETURN,
+            ),
         };
         let lines = [&sensor, &steering].map(|chip| PiLine::connect(chip, options.baud));
         Ok(Self {

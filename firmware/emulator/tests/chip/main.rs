@@ -4,6 +4,7 @@
 
 mod core;
 mod peripherals;
+mod programming;
 mod serial;
 mod support;
 mod wires;

@@ -12,8 +12,8 @@ pub(crate) const START: u64 = FREQUENCY * 65 / 1_000 + 14;
 /// The address at which the images note their results.
 const LOG: u16 = 0x3F00;
 
-/// Compiles an image of `tests/images`; every test has its own output.
-fn image(source: &str, test: &str) -> Image {
+/// Compiles an image of `tests/images` with these flags too; every test has its own output.
+fn image(source: &str, test: &str, flags: &[&str]) -> Image {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images");
     let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{source}-{test}.elf"));
     let status = Command::new("avr-gcc")
@@ -25,6 +25,7 @@ fn image(source: &str, test: &str) -> Image {
             "-o",
         ])
         .arg(&out)
+        .args(flags)
         .arg(folder.join(source))
         .status()
         .expect("avr-gcc is installed, as the emulator's build needs avr-libc");
@@ -34,7 +35,12 @@ fn image(source: &str, test: &str) -> Image {
 
 /// A chip with that image; power comes on now.
 pub(crate) fn chip(source: &str, test: &str) -> Rc<Chip> {
-    Chip::new(&image(source, test), 0, 1).expect("simavr knows the chip")
+    chip_with(source, test, &[])
+}
+
+/// The same, compiled with these flags too.
+pub(crate) fn chip_with(source: &str, test: &str, flags: &[&str]) -> Rc<Chip> {
+    Chip::new(&image(source, test, flags), 0, 1).expect("simavr knows the chip")
 }
 
 /// The first bytes that the program noted.

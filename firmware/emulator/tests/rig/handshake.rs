@@ -4,9 +4,11 @@ use std::time::Duration;
 
 use lager_emulator::chip::ResetLine;
 use lager_emulator::rig::Board;
-use lager_wire::{Callsign, LineState, Payload, ResetCause, SteerFlags, Version};
+use lager_wire::{
+    BUILD, Callsign, LineState, Payload, ResetCause, ResetOrder, SteerFlags, Version, WheelCommand,
+};
 
-use crate::support::{Robot, status};
+use crate::support::{Robot, milliseconds, status};
 
 #[test]
 fn both_boards_shake_hands_with_the_pi_and_with_each_other() {
@@ -21,7 +23,7 @@ fn both_boards_shake_hands_with_the_pi_and_with_each_other() {
             assert_eq!(pi.ups.len(), 1, "one epoch");
             let (_, up) = pi.ups[0];
             assert_eq!((up.callsign, up.version), (callsign, Version::One));
-            assert_eq!(up.reset, ResetCause::PowerOn);
+            assert_eq!((up.reset, up.build), (ResetCause::PowerOn, BUILD));
             let health = pi.health();
             assert!(health.packets > 100);
             assert_eq!((health.lost, health.bad_crc, health.bad_content), (0, 0, 0));
@@ -67,6 +69,25 @@ fn a_reset_is_told_with_its_cause() {
             "ExDe too"
         );
     }
+}
+
+#[test]
+fn the_pi_resets_a_driving_board_and_it_tells_that_it_was_told_to() {
+    let mut robot = Robot::driving(4);
+    let order = Payload::Reset(ResetOrder::Restart);
+    robot.steering.send(&mut robot.rig, order);
+    robot.wheels(WheelCommand::ManualForward);
+    let begin = robot.rig.cycle();
+    let off = robot.run_until_off(Duration::from_millis(5));
+    // The packet takes 220 us, and the board obeys in its next step.
+    assert!(
+        off.is_some_and(|at| at - begin < milliseconds(2)),
+        "{off:?}"
+    );
+    robot.run(Duration::from_millis(600));
+    let (_, up) = robot.steering.ups.last().copied().expect("it was up");
+    assert_eq!((up.rebooted, up.reset), (true, ResetCause::Ordered));
+    assert_eq!(robot.rig.chip(Board::Steering).resets(), 1);
 }
 
 #[test]

@@ -121,6 +121,7 @@ macro_rules! board {
             fn reset_cause(&self) -> lager_wire::ResetCause {
                 lager_wire::ResetCause::PowerOn
             }
+            fn reset(&mut self, _: lager_wire::ResetOrder) {}
             fn kick_watchdog(&mut self) {}
             fn eeprom_read(&self, _: u8) -> u8 {
                 255

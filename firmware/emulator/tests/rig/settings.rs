@@ -3,12 +3,15 @@
 use std::time::Duration;
 
 use lager_emulator::rig::Board;
-use lager_wire::{LineReading, Payload, Setting, SettingKey, SettingReply, SettingStatus};
+use lager_wire::{
+    LineReading, Payload, Profile, Setting, SettingKey, SettingReply, SettingStatus,
+    SteeringProfile, WheelCommand, WheelsProfile,
+};
 
 use crate::support::Robot;
 
 /// How many bytes of EEPROM the boards use.
-const USED: usize = 64;
+const USED: usize = 128;
 
 /// Sends a setting to the steering board and returns its answer.
 fn set(robot: &mut Robot, value: i16) -> SettingReply {
@@ -71,6 +74,59 @@ fn a_damaged_eeprom_is_not_believed() {
         damaged[place] ^= 0x10;
         assert_eq!(in_force(&mut with_eeprom(&damaged)), 2, "byte {place}");
     }
+}
+
+/// Tells the steering board its robot; it takes every value.
+fn tell(robot: &mut Robot, profile: &SteeringProfile) {
+    for (setting, seq) in profile.settings().zip(1..) {
+        let setting = Setting { seq, ..setting };
+        robot.steering.packets.clear();
+        robot
+            .steering
+            .send(&mut robot.rig, Payload::Setting(setting));
+        robot.run(Duration::from_millis(100));
+        let taken = SettingReply {
+            key: setting.key,
+            seq,
+            value: setting.value,
+            status: SettingStatus::Accepted,
+        };
+        let mut packets = robot.steering.packets.iter();
+        let is_taken =
+            packets.any(|arrived| arrived.packet.payload == Payload::SettingReply(taken));
+        assert!(is_taken, "{setting:?}");
+    }
+}
+
+/// The duties at the drivers, as a part of the same forwards.
+fn forwards(robot: &mut Robot) -> [i16; 2] {
+    robot.wheels(WheelCommand::Standby);
+    robot.run(Duration::from_millis(50));
+    robot.wheels(WheelCommand::ManualForward);
+    robot.run(Duration::from_millis(50));
+    robot.rig.duties().map(i16::signum)
+}
+
+#[test]
+fn how_the_motors_are_connected_is_told_and_outlives_the_power() {
+    let mut robot = Robot::up(5);
+    assert_eq!(forwards(&mut robot), [1, 1]);
+    let profile = SteeringProfile {
+        wheels: WheelsProfile {
+            swapped: true,
+            right_reversed: true,
+            ..WheelsProfile::default()
+        },
+        divider: false,
+    };
+    robot.wheels(WheelCommand::Standby);
+    tell(&mut robot, &profile);
+    // The left driver has the right motor.
+    assert_eq!(forwards(&mut robot), [-1, 1]);
+    robot.wheels(WheelCommand::Standby);
+    robot.run(Duration::from_millis(500));
+    let kept = robot.rig.chip(Board::Steering).eeprom(USED);
+    assert_eq!(forwards(&mut with_eeprom(&kept)), [-1, 1]);
 }
 
 #[test]

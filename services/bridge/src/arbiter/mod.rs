@@ -43,6 +43,9 @@
 //!   drives and the operator may stop the robot, and may move the arm while logic's order in force
 //!   is a standby with `arm_granted` (L10). Only logic may give quarter turns and the drop (AMB-2,
 //!   AMB-27). An arm order while a wheel command moves the robot is refused (AMB-28).
+//! * **Nothing moves a robot that its boards do not know**: until the boards have accepted how motors
+//!   and sensors are built, no new order moves the wheels, and a setpoint in force is a standby on
+//!   the wire. If a board does not take it, nothing moves.
 //! * **The arm waits for its profile**: the arbiter holds an arm order until the steering board has
 //!   accepted its limits, and refuses it if the board does not take them.
 //! * **Following may end**: the board gives it up by itself when it has lost its line. That ends
@@ -75,14 +78,14 @@ use ledger::Ledger;
 pub use ledger::{Ended, OrderKey};
 pub use verdict::Verdict;
 
-/// Whether the arm may move.
+/// Whether wheels or arm may move, by what the boards know of their robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ArmGate {
-    /// It may.
+pub enum Gate {
+    /// They may.
     Open,
-    /// Not yet: the bridge is telling the board its limits.
+    /// Not yet: the bridge is telling a board.
     Held,
-    /// No: the board does not take them.
+    /// No: a board does not take it.
     Shut,
 }
 
@@ -149,7 +152,8 @@ pub struct Arbiter {
     silent: bool,
     /// Why no origin may move anything, as the last check of the board showed.
     objection: Refusal,
-    arm: ArmGate,
+    wheels: Gate,
+    arm: Gate,
     /// An earlier life of this link is known, so the board knows our last sequence byte.
     acquainted: bool,
     /// A standby to write before anything else.
@@ -202,7 +206,8 @@ impl Arbiter {
             reported: None,
             silent: false,
             objection: Refusal::NoBoard,
-            arm: ArmGate::Open,
+            wheels: Gate::Open,
+            arm: Gate::Open,
             acquainted: false,
             prelude: None,
             wire_seq: 0,
@@ -298,9 +303,15 @@ impl Arbiter {
         self.expire(now);
     }
 
-    /// Sets whether the arm may move, from the next order on.
-    pub fn set_arm_gate(&mut self, arm: ArmGate) {
+    /// Sets whether wheels and arm may move. What moves the wheels now stands from the next command
+    /// on; it goes on only as a setpoint that its origin still renews.
+    pub fn set_gates(&mut self, wheels: Gate, arm: Gate) {
+        let closes = self.wheels == Gate::Open && wheels != Gate::Open;
+        self.wheels = wheels;
         self.arm = arm;
+        if closes {
+            self.hold_wheels();
+        }
     }
 
     /// Shuts down: whatever runs is aborted, and only standby is written from now on, at short

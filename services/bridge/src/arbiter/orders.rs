@@ -14,7 +14,7 @@ use lager_wire::{ArmCommand, Command, Version, WheelCommand};
 use super::lease::Lease;
 use super::ledger::{Ended, OrderKey};
 use super::verdict::Verdict;
-use super::{Arbiter, ArmGate, Grant, Running, STANDBY, is_slower, moves};
+use super::{Arbiter, Gate, Grant, Running, STANDBY, is_slower, moves};
 
 impl Arbiter {
     /// Takes one order that its origin sent at `sent` (robot time, at most the present). `age`
@@ -131,11 +131,13 @@ impl Arbiter {
             Refusal::Stale
         } else if let Some(why) = board {
             why
+        } else if moves(command) && self.wheels == Gate::Held {
+            Refusal::Undescribed
         } else if self.board == Some(Version::Original) && is_slower(command) {
             Refusal::FullSpeedOnly
         } else if is_arm && self.running.is_some_and(|running| moves(running.command)) {
             return Some(self.refuse(key, Refusal::ArmLocked));
-        } else if is_arm && self.arm == ArmGate::Shut {
+        } else if is_arm && self.arm == Gate::Shut {
             return Some(self.refuse(key, Refusal::ArmUnlimited));
         } else {
             return None;

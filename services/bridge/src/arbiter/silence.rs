@@ -17,15 +17,16 @@ use lager_orders::lease::UNHEARD;
 use lager_topics::{Finish, Refusal};
 use lager_wire::Version;
 
-use super::{Arbiter, STANDBY};
+use super::{Arbiter, Gate, STANDBY};
 
 impl Arbiter {
     /// Why the steering board lets no origin move anything.
-    pub(super) fn board_objection(&self, now: Duration) -> Option<Refusal> {
+    pub fn board_objection(&self, now: Duration) -> Option<Refusal> {
         match self.board {
             None => Some(Refusal::NoBoard),
             Some(Version::Original) => (!self.original_boards).then_some(Refusal::OriginalBoard),
-            Some(Version::One) => self.is_unheard(now).then_some(Refusal::BoardSilent),
+            Some(Version::One) if self.is_unheard(now) => Some(Refusal::BoardSilent),
+            Some(Version::One) => (self.wheels == Gate::Shut).then_some(Refusal::Undescribed),
         }
     }
 

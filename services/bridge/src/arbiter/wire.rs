@@ -14,7 +14,7 @@ use lager_wire::{
 
 use super::lease::Lease;
 use super::ledger::OrderKey;
-use super::{Arbiter, ArmGate, Running, STANDBY, Search, is_slower, moves};
+use super::{Arbiter, Gate, Running, STANDBY, Search, is_slower, moves};
 
 /// How long the wheels are in standby on the wire before an arm command follows. The board unlocks
 /// its arm only in standby (T4), and one pass of its loop must have seen the standby.
@@ -341,6 +341,19 @@ impl Arbiter {
         self.revision = self.revision.wrapping_add(1);
     }
 
+    /// The wheels must stand. A one-shot that was begun is over.
+    pub(super) fn hold_wheels(&mut self) {
+        let Some(running) = self.running.filter(|running| moves(running.command)) else {
+            return;
+        };
+        if !running.command.is_one_shot() {
+            self.idle_seq = self.next_seq();
+            self.reseat();
+        } else if running.written.is_some() {
+            self.finish_running(Finish::Aborted);
+        }
+    }
+
     /// Starts looking for the one-shot in force in the board's reports.
     fn search(&mut self, now: Duration) {
         if let Some(running) = self.running.as_mut() {
@@ -396,11 +409,13 @@ impl Arbiter {
         }
     }
 
-    /// Whether a standby goes out while the order in force, an arm order, must wait.
+    /// Whether a standby goes out while the order in force must wait.
     fn is_held(&self) -> bool {
         self.running.is_some_and(|running| {
             let is_arm = matches!(running.command, Command::Arm(_));
-            running.held_until.is_some() || (is_arm && self.arm != ArmGate::Open)
+            running.held_until.is_some()
+                || (is_arm && self.arm != Gate::Open)
+                || (moves(running.command) && self.wheels != Gate::Open)
         })
     }
 

@@ -44,6 +44,8 @@ impl BridgeCore {
                 }
                 Answered(Outcome::Done)
             }
+            // Nobody would see that the robot goes on when its boards come back.
+            (Some(AskKind::Resume), _) if self.is_lent => Answered(Outcome::NoBoard),
             // It releases only the stop that the request names.
             (Some(AskKind::Resume), _) => match self.stop {
                 Some(stop) if stop.word() == ask.stop_word => {
@@ -99,6 +101,9 @@ impl BridgeCore {
         if is_clear {
             self.stop = None;
             self.arbiter.resume_from_stop();
+        }
+        if core::mem::take(&mut self.starts) {
+            return self.started(is_clear);
         }
         self.asked = Some(Asked::Answered(match is_clear {
             true => Outcome::Done,

@@ -4,11 +4,12 @@
 
 use lager_orders::Mode;
 use lager_stop::Stop;
-use lager_topics::{ArmProfileState, AskKind, StopCause};
+use lager_topics::{AskKind, ProfileState, StopCause, ThoughtKind};
 use lager_wire::{Callsign, PACKET_LENGTH, SteerCommand};
 
 use crate::arbiter::OrderKey;
 use crate::events::BoardUp;
+use crate::profile::Part;
 
 /// One thing to do.
 #[derive(Clone, Copy, Debug)]
@@ -87,10 +88,14 @@ pub enum Notice {
     },
     /// A board resets again and again, and the bridge has stopped the robot.
     KeepsResetting(Callsign),
-    /// The steering board has taken the arm's profile, or has not.
-    Profile(ArmProfileState),
+    /// The ports are lent, or are here again.
+    Lent(bool),
+    /// A board has taken its part of the robot's description, or has not.
+    Profile(Part, ProfileState),
     /// Somebody pressed the switch.
     Pressed(Mode),
+    /// Somebody pressed reset while a stop was in force, and this is what came of it.
+    Reset(ThoughtKind),
     /// A request has set the mode.
     ModeSet(Mode),
     /// A request came too late.

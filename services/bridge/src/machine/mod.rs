@@ -1,7 +1,7 @@
 //! Every decision of the bridge, as a pure state machine: events in, effects out, time an argument.
 //!
 //! It stands apart from the service so that `lager simulate` runs the same bridge: boards that come
-//! and go, the arm's profile and the settings on their way to the boards, requests, the stop, and
+//! and go, what the boards are told of their robot and the settings on their way to the boards, requests, the stop, and
 //! when to publish what. The process that runs it owns the ports, the bus, the stop word and the
 //! clock, and decides nothing. Nothing here allocates.
 //!
@@ -26,12 +26,14 @@
 //! * `ports`: the events of the ports.
 //! * `publishing`: the states that it publishes.
 //! * `rest`: when a stop has come to its end.
+//! * `start`: what a press of reset does to a stop.
 
 mod asks;
 mod effect;
 mod ports;
 mod publishing;
 mod rest;
+mod start;
 #[cfg(test)]
 mod tests;
 
@@ -44,7 +46,8 @@ use lager_stop::Stop;
 use lager_topics::{Health, Outcome, Refusal, SteeringOrder, SteeringReport, StopCause};
 use lager_wire::link::HostTransmitter;
 use lager_wire::{
-    ArmProfile, Callsign, Command, PACKET_LENGTH, Payload, Setting, SettingKey, SteerData, Version,
+    Callsign, Command, PACKET_LENGTH, Payload, RobotProfile, Setting, SettingKey, SteerData,
+    Version,
 };
 
 pub use effect::{Effect, Notice, ShownReport, Write};
@@ -53,10 +56,12 @@ use crate::arbiter::{Arbiter, Ended, OrderKey, Verdict};
 use crate::boards::Boards;
 use crate::calibration::Calibration;
 use crate::frames::ServoTable;
-use crate::profile::ProfileTeller;
+use crate::loan::Loan;
+use crate::profile::Profiles;
 use crate::resets::Resets;
 use crate::settings::Settings;
 use rest::Rest;
+pub use start::ResetPress;
 
 /// How long `link/health` may wait if nothing changes, in robot time.
 const HEALTH_PERIOD: Duration = Duration::from_millis(100);
@@ -81,8 +86,8 @@ pub struct CoreOptions {
     pub raw_line: bool,
     /// Whether to drive an original steering board, whose commands have no age limit.
     pub original_boards: bool,
-    /// The arm's limits for the steering board. Their owner has validated them.
-    pub arm: ArmProfile,
+    /// What the boards are told of their robot. Its owner has validated it.
+    pub robot: RobotProfile,
 }
 
 /// The bridge without ports, bus and clock.
@@ -93,7 +98,7 @@ pub struct BridgeCore {
     boards: Boards,
     transmitters: [HostTransmitter; 2],
     settings: Settings,
-    profile: ProfileTeller,
+    profiles: Profiles,
     calibration: Calibration,
     servos: ServoTable,
     resets: Resets,
@@ -102,8 +107,14 @@ pub struct BridgeCore {
     report: Option<(SteerData, Moment)>,
     /// The stop in force.
     stop: Option<Stop>,
+    /// Since when that stop is obeyed.
+    stopped_at: Option<Duration>,
+    /// The ports are lent.
+    is_lent: bool,
     rest: Rest,
     asked: Option<Asked>,
+    /// The stop is being released for a press of reset, and not for a request.
+    starts: bool,
     parking: Option<Parking>,
     due: Due,
     stage: Stage,
@@ -222,14 +233,17 @@ impl BridgeCore {
             boards: Boards::new(kept),
             transmitters: [HostTransmitter::new(), HostTransmitter::new()],
             settings,
-            profile: ProfileTeller::new(&options.arm),
+            profiles: Profiles::new(&options.robot, kept),
             calibration: Calibration::new(kept),
             servos: ServoTable::default(),
             resets: Resets::default(),
             report: None,
             stop: None,
+            stopped_at: None,
+            is_lent: false,
             rest: Rest::default(),
             asked: None,
+            starts: false,
             parking: None,
             due: Due {
                 health: true,
@@ -277,7 +291,7 @@ impl BridgeCore {
         (verdict == Verdict::Executes).then_some(key)
     }
 
-    /// Somebody moved the switch to `mode`.
+    /// Somebody moved the switch to `mode`, or pressed the mode button.
     pub fn switch(&mut self, mode: Mode) {
         if self.arbiter.mode() != mode {
             self.say(Notice::Pressed(mode));
@@ -289,6 +303,7 @@ impl BridgeCore {
     #[cold]
     pub fn stop(&mut self, stop: Stop) {
         self.stop = Some(stop);
+        self.stopped_at = None;
         self.rest = Rest::default();
         self.arbiter.stop();
         // If a packet was cut in two, a board of ours finds the standby after it by its structure.
@@ -303,6 +318,28 @@ impl BridgeCore {
         }
         self.due.halt = true;
         self.due.health = true;
+    }
+
+    /// Whether a stop is in force.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.is_some()
+    }
+
+    /// Whether the ports may be lent: whoever wants them has stopped the robot, and it stands.
+    pub fn may_lend(&self, now: Duration) -> bool {
+        let is_asked = self
+            .stop
+            .is_some_and(|stop| stop.cause() == StopCause::BoardWork);
+        let is_obeyed = self
+            .stopped_at
+            .is_some_and(|since| now >= since + Loan::AFTER);
+        is_asked && is_obeyed
+    }
+
+    /// The ports are lent from now on, or are here again.
+    pub fn lend(&mut self, is_lent: bool) {
+        self.is_lent = is_lent;
+        self.say(Notice::Lent(is_lent));
     }
 
     /// Shuts down: only standby is written from now on.
@@ -323,6 +360,9 @@ impl BridgeCore {
     pub fn decide(&mut self, now: Duration) {
         self.wake(now);
         self.arbiter.advance(now);
+        if self.is_stopped() {
+            self.stopped_at.get_or_insert(now);
+        }
         self.hear_answer(now);
         self.tells = self.arbiter.revision() != self.told.health || self.health_due <= now;
         self.writes_first = self.told.setpoint
@@ -358,7 +398,7 @@ impl BridgeCore {
             self.arbiter.not_written(now.robot);
             return;
         }
-        if self.stop.is_some() {
+        if self.is_stopped() {
             self.rest.written(now.ns);
         }
         if let Some(parking) = &mut self.parking {
@@ -373,7 +413,7 @@ impl BridgeCore {
             .into_iter()
             .filter(|board| self.boards.place(*board).is_some())
             .filter_map(|board| self.settings.next_due(board))
-            .chain(self.profile.next_due());
+            .chain(self.profiles.next_due());
         settings
             .chain(self.arbiter.next_due())
             .fold(self.health_due, Duration::min)
@@ -515,12 +555,9 @@ impl BridgeCore {
         if let Some(setting) = self.settings.poll(now, board) {
             return Some(setting);
         }
-        if board != Callsign::Steering {
-            return None;
-        }
-        let before = self.profile.state();
-        let setting = self.profile.poll(now);
-        self.heed_profile(before);
+        let before = self.profiles.states();
+        let setting = self.profiles.poll(now, board);
+        self.heed_profiles(before);
         setting
     }
 

@@ -4,15 +4,15 @@
 //! brings.
 
 use lager_orders::Moment;
-use lager_topics::{ArmProfileState, StopCause};
+use lager_topics::{ProfileState, StopCause};
 use lager_wire::link::HostTransmitter;
 use lager_wire::{Callsign, SettingKey, SettingReply, SteerData, Version};
 
 use super::effect::{Notice, ShownReport};
 use super::{BridgeCore, Handshake, REPORT_PERIOD};
-use crate::arbiter::ArmGate;
 use crate::events::{BoardUp, PortEvent};
 use crate::frames::ServoTable;
+use crate::profile::States;
 
 impl BridgeCore {
     /// Takes what has happened at the port at `place`, 0 or 1.
@@ -51,21 +51,16 @@ impl BridgeCore {
         }
     }
 
-    /// Keeps the arm still unless the board has accepted the profile, and reports what the board
-    /// says.
-    pub(super) fn heed_profile(&mut self, before: ArmProfileState) {
-        let state = self.profile.state();
-        self.arbiter.set_arm_gate(match state {
-            // An original board knows no profile and has limits of its own.
-            ArmProfileState::NoBoard | ArmProfileState::Accepted => ArmGate::Open,
-            ArmProfileState::Telling => ArmGate::Held,
-            ArmProfileState::Refused | ArmProfileState::Unanswered => ArmGate::Shut,
-        });
-        match state {
-            _ if state == before => {}
-            ArmProfileState::NoBoard | ArmProfileState::Telling => {}
-            _ => {
-                self.say(Notice::Profile(state));
+    /// Keeps wheels and arm still unless the boards have accepted their profiles, and reports what
+    /// the boards say.
+    pub(super) fn heed_profiles(&mut self, before: States) {
+        let profiles = &self.profiles;
+        self.arbiter.set_gates(profiles.wheels(), profiles.arm());
+        let states = profiles.states();
+        let changed = states.into_iter().zip(before);
+        for ((part, state), _) in changed.filter(|(now, before)| now != before) {
+            if !matches!(state, ProfileState::NoBoard | ProfileState::Telling) {
+                self.say(Notice::Profile(part, state));
                 self.due.health = true;
             }
         }
@@ -79,15 +74,15 @@ impl BridgeCore {
         }
         self.boards.up(place, self.options.baud, board);
         self.settings.board_up(now.robot, up.callsign);
+        let before = self.profiles.states();
+        self.profiles.board_up(now.robot, &up);
+        self.heed_profiles(before);
         if up.callsign == Callsign::Sensor && up.rebooted {
             self.calibration.break_off();
         }
         if up.callsign == Callsign::Steering {
             self.report = None;
             self.servos = ServoTable::default();
-            let before = self.profile.state();
-            self.profile.board_up(now.robot, up.version);
-            self.heed_profile(before);
             self.arbiter.board_up(now.robot, up.version, up.rebooted);
             if up.version == Version::Original && !self.options.original_boards {
                 self.say(Notice::OriginalBoard { place });
@@ -103,10 +98,15 @@ impl BridgeCore {
     }
 
     fn board_down(&mut self, place: usize) {
-        match self.boards.down(place) {
+        let board = self.boards.down(place);
+        if let Some(board) = board {
+            let before = self.profiles.states();
+            self.profiles.board_down(board);
+            self.heed_profiles(before);
+        }
+        match board {
             Some(Callsign::Steering) => {
                 self.arbiter.board_down();
-                self.profile.board_down();
                 self.report = None;
             }
             Some(Callsign::Sensor) => self.calibration.break_off(),
@@ -142,9 +142,9 @@ impl BridgeCore {
     }
 
     fn setting_answered(&mut self, now: Moment, reply: &SettingReply) {
-        let before = self.profile.state();
-        if self.profile.answer(now.robot, reply) {
-            self.heed_profile(before);
+        let before = self.profiles.states();
+        if self.profiles.answer(now.robot, reply) {
+            self.heed_profiles(before);
         } else if self.settings.answer(reply) {
             // Publish before the answer: a gain in force outlives this bridge.
             self.due.health = true;

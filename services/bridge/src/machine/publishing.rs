@@ -29,7 +29,7 @@ impl BridgeCore {
         self.boards.fill(health);
         self.arbiter.fill(now, health);
         self.settings.fill(health);
-        health.arm_profile = self.profile.state().into();
+        self.profiles.fill(health);
         self.calibration.fill(health);
         if let Some(stop) = self.stop {
             health.stop_cause = stop.cause().into();

@@ -3,19 +3,21 @@
 use lager_orders::Mode;
 use lager_stop::Stop;
 use lager_topics::{
-    ArmProfileState, Ask, AskKind, Origin, Outcome, Role, SteeringOrder, SteeringReport, StopCause,
+    Ask, AskKind, Origin, Outcome, ProfileState, Role, SteeringOrder, SteeringReport, StopCause,
 };
 use lager_wire::link::Up;
 use lager_wire::{
-    ArmProfile, Callsign, Command, ResetCause, SteerData, SteerFlags, Version, WheelCommand,
+    Callsign, Command, Profile as _, ResetCause, RobotProfile, SettingReply, SettingStatus,
+    SteerData, SteerFlags, Version, WheelCommand,
 };
 
 use super::*;
 use crate::events::{BoardUp, PortEvent};
+use crate::profile::Part;
 
 const STEERING: usize = 1;
 
-fn at(millis: u64) -> Moment {
+pub(super) fn at(millis: u64) -> Moment {
     let robot = Duration::from_millis(millis);
     let ns = millis * 1_000_000;
     Moment { robot, ns }
@@ -26,32 +28,65 @@ fn options() -> CoreOptions {
         baud: 500_000,
         raw_line: false,
         original_boards: false,
-        arm: ArmProfile::default(),
+        robot: RobotProfile::default(),
     }
 }
 
 /// A core with a steering board that has reported, in the hands of a person.
-fn core() -> BridgeCore {
+pub(super) fn core() -> BridgeCore {
     let mut core = BridgeCore::new(options(), None);
-    let up = Up {
-        callsign: Callsign::Steering,
-        version: Version::One,
-        epoch: 1,
-        reset: ResetCause::PowerOn,
-        rebooted: false,
-        fresh: true,
-    };
-    let up = Some(BoardUp { up, link_epoch: 1 });
-    let version = Version::One;
-    core.port(at(1_000), STEERING, PortEvent::SendAck { version, up });
-    turn(&mut core, 1_000);
+    board_up(&mut core, 1_000, Callsign::Steering);
+    obey(&mut core, 1_000, Callsign::Steering);
     report(&mut core, 1_001, IDLE);
     turn(&mut core, 1_001);
     core
 }
 
+/// The board takes what it is told of wheels or sensors; the arm's profile stays unanswered.
+fn obey(core: &mut BridgeCore, millis: u64, board: Callsign) {
+    let robot = options().robot;
+    let settings: Vec<_> = match board {
+        Callsign::Steering => robot.steering.settings().collect(),
+        _ => robot.sensors.settings().collect(),
+    };
+    for (setting, seq) in settings.into_iter().zip(1..) {
+        let reply = SettingReply {
+            key: setting.key,
+            seq,
+            value: setting.value,
+            status: SettingStatus::Accepted,
+        };
+        let place = usize::from(board == Callsign::Steering);
+        core.port(at(millis), place, PortEvent::Setting(reply));
+        turn(core, millis);
+    }
+}
+
+/// A board comes up on the port that bears its name.
+fn board_up(core: &mut BridgeCore, millis: u64, callsign: Callsign) {
+    let up = Up {
+        callsign,
+        version: Version::One,
+        epoch: 1,
+        reset: ResetCause::PowerOn,
+        rebooted: false,
+        fresh: true,
+        build: 1,
+    };
+    let up = Some(BoardUp { up, link_epoch: 1 });
+    let version = Version::One;
+    let place = usize::from(callsign == Callsign::Steering);
+    core.port(at(millis), place, PortEvent::SendAck { version, up });
+    turn(core, millis);
+}
+
+pub(super) fn sensor_up(core: &mut BridgeCore, millis: u64) {
+    board_up(core, millis, Callsign::Sensor);
+    obey(core, millis, Callsign::Sensor);
+}
+
 /// What a steering board reports that does nothing.
-const IDLE: SteerData = SteerData {
+pub(super) const IDLE: SteerData = SteerData {
     code: 0,
     left_duty: 0,
     right_duty: 0,
@@ -62,7 +97,7 @@ const IDLE: SteerData = SteerData {
     battery_decivolts: 0,
 };
 
-fn report(core: &mut BridgeCore, millis: u64, data: SteerData) {
+pub(super) fn report(core: &mut BridgeCore, millis: u64, data: SteerData) {
     let at = at(millis);
     core.port(at, STEERING, PortEvent::Steer { data, at });
 }
@@ -97,13 +132,13 @@ fn step(core: &mut BridgeCore, millis: u64) -> Option<(&'static str, Option<u8>)
         Effect::ShowReport(_) => ("report", None),
         Effect::Stop(_) => ("stop", None),
         Effect::Release(_) => ("release", None),
-        Effect::Say(Notice::Profile(ArmProfileState::Unanswered)) => ("no answer", None),
+        Effect::Say(Notice::Profile(Part::Arm, ProfileState::Unanswered)) => ("no answer", None),
         Effect::Say(_) => ("news", None),
     })
 }
 
 /// A turn to its end; what was done.
-fn turn(core: &mut BridgeCore, millis: u64) -> Vec<(&'static str, Option<u8>)> {
+pub(super) fn turn(core: &mut BridgeCore, millis: u64) -> Vec<(&'static str, Option<u8>)> {
     core.decide(at(millis).robot);
     std::iter::from_fn(|| step(core, millis)).collect()
 }
@@ -344,6 +379,48 @@ fn a_release_ends_the_stop_that_it_names_and_no_other() {
     core.ask(at(2_002), &resume(newer));
     let did = turn(&mut core, 2_002);
     assert!(did.contains(&("release", None)), "{did:?}");
+}
+
+#[test]
+fn ports_are_lent_once_the_stop_of_whoever_wants_them_has_been_obeyed_for_a_while() {
+    let mut core = core();
+    let stop = |cause, millis| Stop::new(Role::Operator, cause, at(millis).ns);
+    core.stop(stop(StopCause::Ordered, 1_100));
+    turn(&mut core, 1_100);
+    turn(&mut core, 1_500);
+    assert!(!core.may_lend(at(1_500).robot), "nobody wants them");
+    // This process was frozen when the stop was set, and sees it late.
+    core.stop(stop(StopCause::BoardWork, 1_600));
+    assert!(!core.may_lend(at(3_000).robot), "not obeyed yet");
+    turn(&mut core, 3_000);
+    assert!(!core.may_lend(at(3_199).robot));
+    assert!(core.may_lend(at(3_200).robot));
+    core.lend(true);
+    let resume = |millis| Ask {
+        kind: AskKind::Resume.into(),
+        stop_word: stop(StopCause::BoardWork, 1_600).word(),
+        issued_ns: at(millis).ns,
+        lifetime_ms: 500,
+        ..Ask::default()
+    };
+    for (is_lent, millis, outcome) in [
+        (true, 3_300, Outcome::NoBoard),
+        (false, 3_400, Outcome::Done),
+    ] {
+        core.lend(is_lent);
+        core.ask(at(millis), &resume(millis));
+        core.decide(at(millis).robot);
+        while let Some(effect) = core.next(at(millis)) {
+            match effect {
+                Effect::Release(_) => core.released(true),
+                Effect::PublishHealth { .. } => core.health_told(),
+                _ => {}
+            }
+        }
+        let answer = core.answer().expect("an answer");
+        assert_eq!(answer.outcome.get(), Some(outcome), "lent: {is_lent}");
+    }
+    assert!(!core.may_lend(at(3_900).robot), "it may go on");
 }
 
 #[test]

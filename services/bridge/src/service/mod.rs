@@ -34,7 +34,8 @@ use lager_sample::Topic;
 use lager_stop::{StopError, StopPage};
 use lager_topics::{
     Ask, BridgeAnswer, BridgeRequest, Health, Input, InputKind, LatencyCommand, LinkHealth,
-    OperatorInput, Origin, SteeringCommand, SteeringState, StopCause,
+    LogThought, NavStatus, NavigatorStatus, OperatorInput, Origin, SteeringCommand, SteeringState,
+    StopCause,
 };
 use lager_wake::{Shutdown, Waiter, urgency};
 
@@ -43,7 +44,8 @@ use crate::config::BridgeConfig;
 use crate::counts::Counts;
 use crate::events::PortEvent;
 use crate::latency::CommandMeter;
-use crate::machine::{BridgeCore, CoreOptions};
+use crate::loan::{Loan, Looking};
+use crate::machine::{BridgeCore, CoreOptions, ResetPress};
 use crate::reader::{Handed, QUEUE, Reader};
 use crate::serial::{PacketWriter, SerialPort};
 
@@ -53,6 +55,10 @@ const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
 /// How many presses of buttons can wait for the main loop.
 const TOUCHES: usize = 16;
+
+/// Logic that has published nothing for longer than this is silent, in ns. It publishes its state
+/// every 50 ms of robot time.
+const LOGIC_SILENT: u64 = 1_000_000_000;
 
 /// How long a shutdown waits for the wheels to stand, in robot time.
 const PARKING: Duration = Duration::from_millis(200);
@@ -106,31 +112,39 @@ pub fn run_with(
     let [first, second] = &mut queues;
     let (first_in, first_out) = first.split();
     let (second_in, second_out) = second.split();
-    let mut touches: Queue<Touch, TOUCHES> = Queue::new();
+    let mut touches: Queue<(Touch, u64), TOUCHES> = Queue::new();
     let (mut touched, touches) = touches.split();
 
     let server = bus.server::<BridgeRequest>()?;
     let events = [first_out, second_out];
-    let mut service = Service::new(bus, config, &counts, kept, events, touches)?;
+    let loan = Loan::new(bus.home(), bus.unit());
+    let mut service = Service::new(bus, config, (&counts, &loan), kept, events, touches)?;
     let ringer = service.waiter.ringer();
     shutdown.wake(ringer.clone());
     // The word decides whether the robot is stopped. If the state says stopped and the word is
     // clear, the earlier bridge ended during a release, or somebody has wiped the word.
-    if config.resume && kept.is_none_or(|(kept, _)| kept.stopped != 0) {
+    let is_lost = match kept {
+        None => true,
+        Some((kept, _)) => kept.stopped != 0 && service.page.news().is_none(),
+    };
+    if config.resume && is_lost {
         service.page.stop(StopCause::StateLost);
+    }
+    if loan.is_lent() {
+        service.core.lend(true);
     }
     // Do this before any thread can bring a board, so that nothing is written that a stop forbids.
     service.act();
     std::thread::scope(|scope| {
         for (place, events) in [first_in, second_in].into_iter().enumerate() {
             let port = (config.ports[place].as_path(), config.baud);
-            let (ringer, counts, end) = (ringer.clone(), &counts, &end);
+            let (ringer, counts) = (ringer.clone(), (&counts, &end, &loan));
             std::thread::Builder::new()
                 .name(["sensor-port", "steering-port"][place].to_owned())
                 .spawn_scoped(scope, move || {
                     // Logic and the main loop come later on the path.
                     urgency::step_back(2, config.waiting);
-                    Reader::new(place, port, bus, events, ringer, (counts, end)).run();
+                    Reader::new(place, port, bus, events, ringer, counts).run();
                 })
                 .map_err(|error| PortError::Thread {
                     what: "a serial port",
@@ -141,10 +155,10 @@ pub fn run_with(
         if let Some(config) = &config.buttons {
             let (ringer, end, resume) = (ringer.clone(), &end, kept.is_some());
             let watch = move || {
-                buttons::watch(config, open, resume, end, |touch| {
+                buttons::watch(config, open, resume, end, |touch, at_ns| {
                     // A main loop with so many events waiting hangs, and the supervisor will
                     // replace it.
-                    let _ = touched.enqueue(touch);
+                    let _ = touched.enqueue((touch, at_ns));
                     ringer.ring();
                 });
             };
@@ -173,16 +187,28 @@ struct Port<'a> {
     writer: PacketWriter,
 }
 
+/// What the main loop needs for the robot's buttons.
+struct Buttons {
+    /// Where presses are published.
+    inputs: Publisher<OperatorInput>,
+    /// Where people read what has come of them.
+    thoughts: Publisher<LogThought>,
+    /// Where logic says whether the robot stands on the delivery node.
+    status: Subscriber<NavStatus>,
+}
+
 /// The main loop: everything that the core does not have.
 struct Service<'a> {
     clock: Clock,
     config: &'a BridgeConfig,
     counts: &'a Counts,
+    loan: &'a Loan<'a>,
+    looking: Looking,
     waiter: Waiter,
     orders: Subscriber<SteeringCommand>,
-    touches: Consumer<'a, Touch>,
-    /// Where presses of the buttons are published, if there are buttons.
-    touched: Option<Publisher<OperatorInput>>,
+    touches: Consumer<'a, (Touch, u64)>,
+    /// What only a robot with buttons has on the bus.
+    buttons: Option<Buttons>,
     state: Publisher<SteeringState>,
     health: Publisher<LinkHealth>,
     latency: Publisher<LatencyCommand>,
@@ -198,10 +224,10 @@ impl<'a> Service<'a> {
     fn new(
         bus: &Bus,
         config: &'a BridgeConfig,
-        counts: &'a Counts,
+        (counts, loan): (&'a Counts, &'a Loan<'a>),
         kept: Option<(Health, Duration)>,
         events: [Consumer<'a, Handed>; 2],
-        touches: Consumer<'a, Touch>,
+        touches: Consumer<'a, (Touch, u64)>,
     ) -> Result<Self, BridgeError> {
         let port = |events| Port {
             events,
@@ -224,17 +250,23 @@ impl<'a> Service<'a> {
             baud: config.baud,
             raw_line: config.raw_line,
             original_boards: config.original_boards,
-            arm: config.arm,
+            robot: config.robot,
         };
         Ok(Self {
             clock: bus.clock(),
             config,
             counts,
+            loan,
+            looking: Looking::default(),
             waiter,
             orders: bus.subscriber()?,
             touches,
-            touched: match config.buttons {
-                Some(_) => Some(bus.publisher()?),
+            buttons: match config.buttons {
+                Some(_) => Some(Buttons {
+                    inputs: bus.publisher()?,
+                    thoughts: bus.publisher()?,
+                    status: bus.subscriber()?,
+                }),
                 None => None,
             },
             state: bus.publisher()?,
@@ -261,6 +293,7 @@ impl<'a> Service<'a> {
         }
         self.take_orders();
         self.flush();
+        self.look_at_the_loan();
     }
 
     /// Waits for something to do, and obeys a stop that has come meanwhile.
@@ -290,25 +323,78 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Takes what people have done with the buttons, and tells logic and observers.
+    /// Takes what people have done with the buttons, and tells logic and observers. This process
+    /// may have been frozen since a press.
     fn take_touches(&mut self) {
-        while let Some(touch) = self.touches.dequeue() {
-            let kind = match touch {
-                Touch::Reset => InputKind::ResetPressed,
-                Touch::Switched(Mode::Manual) => InputKind::SwitchedToManual,
-                Touch::Switched(Mode::Autonomous) => InputKind::SwitchedToAutonomous,
-            };
-            if let Touch::Switched(mode) = touch {
-                self.core.switch(mode);
+        while let Some((touch, at_ns)) = self.touches.dequeue() {
+            let now = self.moment();
+            if touch.is_late(at_ns, now.ns) {
+                let late_ms = at_ns.abs_diff(now.ns) / 1_000_000;
+                tracing::warn!(?touch, "a press came {late_ms} ms late and is not taken");
+                continue;
             }
+            let kind = match touch {
+                Touch::Reset => self.press_reset(now, at_ns),
+                Touch::Switched(mode) => self.switch(mode),
+                Touch::Toggled => self.switch(self.core.mode().other()),
+            };
             let input = Input {
                 kind: kind.into(),
                 ..Input::default()
             };
-            let told = self.touched.as_ref().map(|to| to.send(Cause::OWN, input));
+            let told = self.buttons.as_ref();
+            let told = told.map(|buttons| buttons.inputs.send(Cause::OWN, input));
             if let Some(Err(error)) = told {
                 self.complain(&error);
             }
+        }
+    }
+
+    fn switch(&mut self, mode: Mode) -> InputKind {
+        self.core.switch(mode);
+        match mode {
+            Mode::Manual => InputKind::SwitchedToManual,
+            Mode::Autonomous => InputKind::SwitchedToAutonomous,
+        }
+    }
+
+    fn press_reset(&mut self, now: Moment, at_ns: u64) -> InputKind {
+        let status = self.logic_status(now.ns);
+        let buttons = self.config.buttons.as_ref();
+        let press = ResetPress {
+            at_ns,
+            may_start: buttons.is_some_and(|buttons| buttons.reset_starts),
+            status: status.as_ref(),
+        };
+        let kind = self.core.press_reset(now, &press);
+        self.act();
+        kind
+    }
+
+    /// The state that logic has published last, unless logic is silent.
+    fn logic_status(&mut self, now_ns: u64) -> Option<NavigatorStatus> {
+        let latest = self.next(|service| match &mut service.buttons {
+            Some(buttons) => buttons.status.latest(),
+            None => Ok(None),
+        })?;
+        let age_ns = now_ns.abs_diff(latest.stamp().publish_time_ns);
+        (age_ns <= LOGIC_SILENT).then_some(*latest)
+    }
+
+    /// Lends the ports, or takes them back. The lock is looked at only while that can be: its file is
+    /// the business of whoever works on the boards.
+    fn look_at_the_loan(&mut self) {
+        // On the path nobody reads the clock for this.
+        if !self.loan.is_lent() && !self.core.is_stopped() {
+            return;
+        }
+        let now = self.moment();
+        if !self.loan.is_lent() && !self.core.may_lend(now.robot) {
+            return;
+        }
+        if let Some(is_lent) = self.looking.look(now.ns, self.loan) {
+            self.core.lend(is_lent);
+            self.act();
         }
     }
 

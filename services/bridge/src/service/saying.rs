@@ -2,25 +2,34 @@
 //!
 //! It is apart because the sentences are for people, and tell them what to do.
 
-use lager_topics::ArmProfileState;
-use lager_wire::Callsign;
+use lager_ports::Cause;
+use lager_topics::{Misfit, ProfileState, Role, Thought, ThoughtKind};
 
 use super::Service;
+use crate::events::BoardUp;
 use crate::machine::Notice;
+use crate::profile::Part;
 
 impl Service<'_> {
-    pub(super) fn say(&self, news: &Notice) {
+    pub(super) fn say(&mut self, news: &Notice) {
         let port = |place: usize| self.config.ports[place].display();
         match *news {
-            Notice::Up { place, board } => tracing::info!(
-                port = %port(place),
-                version = ?board.up.version,
-                epoch = board.link_epoch,
-                reset = ?board.up.reset,
-                "the {} board {}",
-                name(board.up.callsign),
-                if board.up.rebooted { "has restarted" } else { "is up" },
-            ),
+            Notice::Up { place, board } => {
+                let BoardUp { up, link_epoch } = board;
+                let who = up.callsign;
+                tracing::info!(
+                    port = %port(place),
+                    version = ?up.version,
+                    build = up.build,
+                    epoch = link_epoch,
+                    reset = ?up.reset,
+                    "the {who} board {}",
+                    if up.rebooted { "has restarted" } else { "is up" },
+                );
+                if let Some(misfit) = Misfit::of(up.version as u8, up.build) {
+                    tracing::warn!("the {who} board does not fit: {misfit}");
+                }
+            }
             Notice::Silent { place } => {
                 tracing::info!("the board on {} has fallen silent", port(place));
             }
@@ -32,35 +41,54 @@ impl Service<'_> {
             ),
             Notice::KeepsResetting(board) => tracing::error!(
                 "the {} board keeps resetting; the robot is stopped: look at its power and cables",
-                name(board)
+                board
             ),
-            Notice::Profile(state) => say_profile(state),
+            Notice::Lent(true) => tracing::info!(
+                "`lager board` has the boards' ports; the robot stands, and takes them back when it ends"
+            ),
+            Notice::Lent(false) => tracing::info!(
+                "the boards' ports are back; the robot stands until somebody resumes"
+            ),
+            Notice::Profile(part, state) => say_profile(part, state),
             Notice::Pressed(mode) => tracing::info!(?mode, "the switch was pressed"),
+            Notice::Reset(what) => self.think(what),
             Notice::ModeSet(mode) => tracing::info!(?mode, "the mode is set"),
             Notice::Late(kind) => {
                 tracing::warn!(?kind, "a request came too late and is not carried out");
             }
         }
     }
-}
 
-fn name(board: Callsign) -> &'static str {
-    match board {
-        Callsign::Steering => "steering",
-        _ => "sensor",
+    /// Tells people at the panel and in the log what has come of a press of a button.
+    fn think(&mut self, what: ThoughtKind) {
+        let thought = Thought {
+            from: Role::Bridge.into(),
+            ..what.into()
+        };
+        tracing::info!("{thought}");
+        let sent = self.buttons.as_ref();
+        let sent = sent.map(|buttons| buttons.thoughts.send(Cause::OWN, thought));
+        if let Some(Err(error)) = sent {
+            self.complain(&error);
+        }
     }
 }
 
-fn say_profile(state: ArmProfileState) {
+fn say_profile(part: Part, state: ProfileState) {
+    let (board, sections) = (part.board(), part.sections());
+    let still = match part {
+        Part::Arm => "the arm",
+        Part::Steering | Part::Sensors => "the robot",
+    };
     match state {
-        ArmProfileState::NoBoard | ArmProfileState::Telling => {}
-        ArmProfileState::Accepted => tracing::info!("the steering board obeys [arm]"),
-        ArmProfileState::Refused => tracing::error!(
-            "the steering board does not take [arm] and keeps the limits it had, so the arm is \
-             not moved; flash the board with the image of this program's source"
+        ProfileState::NoBoard | ProfileState::Telling => {}
+        ProfileState::Accepted => tracing::info!("the {board} board obeys {sections}"),
+        ProfileState::Refused => tracing::error!(
+            "the {board} board does not take {sections} and keeps what it had, so {still} is not \
+             moved; `lager board update` gives the board the image that fits"
         ),
-        ArmProfileState::Unanswered => tracing::warn!(
-            "the steering board does not answer to [arm], so the arm is not moved; it is told \
+        ProfileState::Unanswered => tracing::warn!(
+            "the {board} board does not answer to {sections}, so {still} is not moved; it is told \
              again every five seconds"
         ),
     }

@@ -2,7 +2,7 @@
 
 use lager_orders::Mode;
 use lager_ports::Keeper;
-use lager_topics::{ArmProfileState, Health, LinkHealth, Role, StopCause};
+use lager_topics::{Health, LinkHealth, ProfileState, Role, StopCause};
 use lager_wire::{Centimetres, LineState, Payload, ResetCause};
 
 use crate::harness::{
@@ -56,13 +56,13 @@ fn a_board_that_lost_its_power_with_its_cable_has_restarted() {
 #[test]
 fn the_steering_board_is_told_the_arms_profile_and_again_when_it_has_restarted() {
     let mut robot = Robot::with(SensorBoard::new(), SteeringBoard::new());
-    robot.bridge_config.arm.torque_limit = 700;
-    let values = robot.bridge_config.arm.values();
+    robot.bridge_config.robot.arm.torque_limit = 700;
+    let values = robot.bridge_config.robot.arm.values();
     robot.start();
     for restarts in 0..3 {
         let what = "the board obeys the profile";
         robot.hands.wait_for_health(what, |health| {
-            health.steering.reboots == restarts && health.arm_profile == ArmProfileState::Accepted
+            health.steering.reboots == restarts && health.arm_profile == ProfileState::Accepted
         });
         let steering = &robot.steering;
         steering.with(|board| {
@@ -101,9 +101,7 @@ fn an_unplugged_port_is_opened_again_when_it_is_back() {
         assert_eq!(health.steering.port, 0xFF);
         assert_eq!(health.sensor.up, 1);
         robot.steering.plug();
-        let health = robot
-            .hands
-            .wait_for_health("the board is back", |health| health.steering.up == 1);
+        let health = robot.wait_until_up();
         assert_eq!(health.steering.epoch, epoch + round);
         assert_eq!(health.steering.lost, 0);
         assert_eq!(

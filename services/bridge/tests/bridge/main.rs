@@ -3,6 +3,7 @@
 
 mod failures;
 mod harness;
+mod lent;
 mod original;
 mod pressed;
 mod serial;

@@ -5,10 +5,15 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
-use lager_bridge::buttons::{ButtonsConfig, Lines, Movement};
+use lager_bridge::buttons::{BETWEEN_PRESSES, ButtonsConfig, Lines, Movement, SwitchKind};
 use lager_home::Clock;
 use lager_orders::Mode;
-use lager_topics::{Health, Input, InputKind, LinkHealth, OperatorInput, Refusal, Role};
+use lager_ports::{Cause, Publisher};
+use lager_stop::StopWord;
+use lager_topics::{
+    Health, Input, InputKind, LinkHealth, LogThought, NavStatus, NavigatorStatus, OperatorInput,
+    Phase, Refusal, Role, StopCause, ThoughtKind,
+};
 
 use crate::harness::{
     Bridge, FORWARD, Robot, Seen, SensorBoard, SteeringBoard, operator, wait_until,
@@ -105,6 +110,8 @@ impl Scene {
             chip: "/dev/none".into(),
             reset: Some(RESET),
             switch: Some(SWITCH),
+            switch_kind: SwitchKind::Position,
+            reset_starts: true,
             debounce: Duration::from_millis(20),
         });
         let inputs = Seen::new(&robot.isolation.open(Role::Observer));
@@ -253,4 +260,111 @@ fn a_switch_that_was_moved_while_its_chip_was_away_counts_when_that_is_back() {
     });
     assert_eq!(scene.told(), Some(InputKind::SwitchedToAutonomous));
     scene.mode(Mode::Autonomous);
+}
+
+#[test]
+fn a_mode_button_toggles_and_one_that_is_held_at_the_start_changes_nothing() {
+    let mut scene = Scene::new();
+    let buttons = scene.robot.bridge_config.buttons.as_mut();
+    buttons.expect("buttons").switch_kind = SwitchKind::Press;
+    scene.contacts.moves(SWITCH, true);
+    scene.start();
+    // It is let go, and somebody has set no mode.
+    scene.contacts.moves(SWITCH, false);
+    let press = |scene: &mut Scene| {
+        // Two presses are never so near to each other.
+        std::thread::sleep(Duration::from_nanos(BETWEEN_PRESSES) * 2);
+        scene.contacts.moves(SWITCH, true);
+        scene.contacts.moves(SWITCH, false);
+        // The contact bounces.
+        scene.contacts.moves(SWITCH, true);
+        scene.contacts.moves(SWITCH, false);
+        scene.told()
+    };
+    for (mode, told) in [
+        (Mode::Autonomous, InputKind::SwitchedToAutonomous),
+        (Mode::Manual, InputKind::SwitchedToManual),
+        (Mode::Autonomous, InputKind::SwitchedToAutonomous),
+    ] {
+        assert_eq!(press(&mut scene), Some(told));
+        scene.mode(mode);
+    }
+    assert!(scene.inputs.drain().is_empty());
+}
+
+/// Logic, as the bridge sees it, and what people read.
+struct Around {
+    status: Publisher<NavStatus>,
+    thoughts: Seen<LogThought>,
+}
+
+impl Around {
+    fn new(scene: &Scene) -> Self {
+        Self {
+            status: scene
+                .robot
+                .isolation
+                .open(Role::Logic)
+                .publisher()
+                .expect("a port"),
+            thoughts: Seen::new(&scene.robot.isolation.open(Role::Observer)),
+        }
+    }
+
+    /// Presses reset while logic says whether it stands on the delivery node. Returns what people
+    /// and logic are told.
+    fn press(&mut self, scene: &mut Scene, at_start: u8) -> (Option<ThoughtKind>, InputKind) {
+        std::thread::sleep(Duration::from_nanos(BETWEEN_PRESSES) * 2);
+        let status = NavigatorStatus {
+            phase: Phase::WaitingForOrder.into(),
+            at_start,
+            ..NavigatorStatus::default()
+        };
+        self.status.send(Cause::OWN, status).expect("a reader");
+        scene.contacts.moves(RESET, true);
+        scene.contacts.moves(RESET, false);
+        let told = scene.told().expect("a known kind");
+        let thought = self.thoughts.drain().pop();
+        (thought.and_then(|thought| thought.kind.get()), told)
+    }
+}
+
+#[test]
+fn reset_at_the_delivery_node_ends_the_stop_of_a_fresh_start_and_no_other() {
+    let mut scene = Scene::new();
+    let word = scene.robot.hands.stop_word.clone();
+    let start = || StopWord::set(&word, Role::Supervisor, StopCause::FreshStart);
+    start().expect("a stop");
+    scene.start();
+    assert_eq!(scene.told(), Some(InputKind::SwitchedToManual));
+    let mut around = Around::new(&scene);
+    let stays = |scene: &Scene| assert!(scene.robot.hands.stop_told().stop().is_some());
+
+    let elsewhere = around.press(&mut scene, 0);
+    assert_eq!(
+        elsewhere,
+        (Some(ThoughtKind::ResetElsewhere), InputKind::ResetPressed)
+    );
+    stays(&scene);
+    let started = around.press(&mut scene, 1);
+    assert_eq!(
+        started,
+        (Some(ThoughtKind::StartedByReset), InputKind::StartPressed)
+    );
+    let hands = &mut scene.robot.hands;
+    hands.wait_for_health("the stop is over", |health| health.stopped == 0);
+    assert_eq!(hands.stop_told().stop(), None);
+
+    // A person stops the robot after the fresh start: that one stays.
+    start().expect("a stop");
+    hands.stop();
+    hands.wait_for_health("the person's stop", |health| {
+        health.stopped != 0 && health.stop_cause == StopCause::Ordered
+    });
+    let ordered = around.press(&mut scene, 1);
+    assert_eq!(
+        ordered,
+        (Some(ThoughtKind::ResetKeepsStop), InputKind::ResetPressed)
+    );
+    stays(&scene);
 }

@@ -5,7 +5,7 @@ use std::os::fd::AsFd;
 use std::time::Duration;
 
 use lager_bridge::serial::{OpenPortError, PacketWriter, Sent, SerialPort};
-use rustix::termios::tcgetattr;
+use rustix::termios::{ControlModes, OptionalActions, tcgetattr, tcsetattr};
 
 use crate::harness::{Isolation, Pty, wait_until};
 
@@ -52,6 +52,22 @@ fn every_byte_passes_unchanged_in_both_directions() {
         got.len() >= expected.len()
     });
     assert_eq!(got, expected);
+}
+
+#[test]
+fn a_port_hangs_up_nothing_when_it_is_closed_whatever_was_set_before() {
+    let isolation = Isolation::new();
+    let path = isolation.folder().join("port");
+    let _pty = Pty::new(&path);
+    let other = std::fs::File::open(&path).unwrap();
+    let mut termios = tcgetattr(&other).unwrap();
+    termios.control_modes |= ControlModes::HUPCL;
+    tcsetattr(&other, OptionalActions::Now, &termios).unwrap();
+    // An adapter would drop DTR at the last close, and reset a board behind it.
+    let port = SerialPort::open(&path, 500_000).unwrap();
+    drop(port);
+    let modes = tcgetattr(&other).unwrap().control_modes;
+    assert!(!modes.contains(ControlModes::HUPCL), "{modes:?}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use lager_orders::Mode;
 use lager_topics::{Ask, AskKind, Calibration, Finish, Health, Outcome, Role};
-use lager_wire::{ArmCommand, Command, LineReading, LineState, SettingStatus};
+use lager_wire::{ArmCommand, BUILD, Command, LineReading, LineState, SettingStatus};
 
 use crate::harness::{FORWARD, Robot, STANDBY, SensorBoard, SteeringBoard, operator, wait_until};
 
@@ -15,6 +15,7 @@ fn both_boards_come_up_and_health_says_so() {
             health.steering.board_refused == 1 && health.sensor.board_load_percent == 42
         });
     assert_eq!((health.sensor.version, health.steering.version), (1, 1));
+    assert_eq!((health.sensor.build, health.steering.build), (BUILD, BUILD));
     assert_eq!((health.sensor.port, health.steering.port), (0, 1));
     assert_eq!((health.sensor.epoch, health.steering.epoch), (1, 1));
     assert_eq!(

@@ -3,10 +3,10 @@
 use core::time::Duration;
 
 use lager_floor::Node;
+use lager_home::Watched;
 use lager_lines::conversation::RobotLine;
 use lager_lines::extension::{Happened, Report};
 use lager_orders::{Code, Moment, Reason};
-use lager_sample::Stamp;
 use lager_topics::{
     BridgeAnswer, Event, Health, NavigatorStatus, OrderQueue, Role, Route, SteeringReport, Thought,
     WorldAnswer,
@@ -146,6 +146,24 @@ impl Conversation {
         self.known.machine = machine;
     }
 
+    /// How the services are that `lager up` keeps alive.
+    pub fn services(&mut self, now: Moment, services: Vec<Watched>) {
+        for (kind, service) in self.lives.look(now.ns, &services) {
+            self.happened(now, kind, &service);
+        }
+        self.known.services = services;
+    }
+
+    /// What a person has asked of the robot at this moment, but not through the station: the part by
+    /// which, and the words of the action.
+    pub fn asked(&mut self, at_ns: u64, words: &str) {
+        let at = Moment {
+            ns: at_ns,
+            ..Moment::default()
+        };
+        self.happened(at, Happened::Asked, words);
+    }
+
     /// A service has thought something.
     pub fn thought(&mut self, thought: &Thought) {
         let now = Moment {
@@ -156,23 +174,11 @@ impl Conversation {
         self.say_if_up(Some(speech::thought(&thought.to_string())));
     }
 
-    /// A service has published a sample with this stamp, which says when the service began. A sample
-    /// that is older than its writer is no news: the attendant hands a dead service's last one on.
-    pub fn lives(&mut self, now: Moment, service: Role, stamp: &Stamp) {
-        let since = stamp.epoch;
-        let before = self.lives.get(&service).copied();
-        if stamp.publish_time_ns < since || before.is_some_and(|before| since <= before) {
-            return;
-        }
-        self.lives.insert(service, since);
-        if before.is_some() {
-            self.happened(now, Happened::Restarted, service.as_str());
-        }
-    }
-
     /// This process itself has started again.
     pub fn lives_again(&mut self, now: Moment) {
-        self.happened(now, Happened::Restarted, Role::Comm.as_str());
+        for kind in [Happened::Ended, Happened::Restarted] {
+            self.happened(now, kind, Role::Comm.as_str());
+        }
     }
 
     /// Tells people the bridge's news: stops, and who may drive.

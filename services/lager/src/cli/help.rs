@@ -19,7 +19,17 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ),
     ("Look at it", &["top", "topic", "bag"]),
     ("Measure", &["bench"]),
-    ("Set up and mend", &["doctor", "config", "completions"]),
+    (
+        "Set up and mend",
+        &[
+            "doctor",
+            "board",
+            "report",
+            "config",
+            "completions",
+            "manual",
+        ],
+    ),
     (
         "The services, as `up` or systemd starts them",
         &[

@@ -267,6 +267,12 @@ pub fn split_size(text: &str) -> Result<u64, String> {
     whole(text, 1..=1 << 20, "a file has from 1 MiB to 1048576 MiB")
 }
 
+/// How long a bit takes on a programmer's wires, in microseconds.
+pub fn bit_clock(text: &str) -> Result<f64, String> {
+    let rule = "a bit takes from 0.1 to 1000 microseconds";
+    number(text, |us| (0.1..=1000.0).contains(&us), rule)
+}
+
 /// How many samples may wait.
 pub fn queue(text: &str) -> Result<usize, String> {
     whole(

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
-use lager_bridge::buttons::ButtonsConfig;
+use lager_bridge::buttons::{ButtonsConfig, SwitchKind};
 
 use super::section::section;
 
@@ -19,10 +19,18 @@ section! {
         /// ground. Unset, there are no buttons.
         pub chip: Option<PathBuf> = None,
         /// The line of the reset button, by its offset. It says that the robot stands on the
-        /// delivery node.
+        /// delivery node, looking into the warehouse.
         pub reset: Option<u32> = None,
-        /// The line of the mode switch: open is manual, closed is autonomous.
+        /// Whether a press of reset at the delivery node also ends the stop with which real boards
+        /// start, so that nobody needs a shell. If the robot did not know that it stands there,
+        /// the second press does. A stop that a person or a fault has set stays.
+        pub reset_starts: bool = true,
+        /// The line of the mode switch or mode button.
         pub switch: Option<u32> = None,
+        /// What it is: "position", a switch that stays where it is moved (open is manual, closed is
+        /// autonomous), or "press", a button that springs back and toggles the mode. A switch is
+        /// the default because everybody can see the mode by it.
+        pub switch_kind: SwitchKind = SwitchKind::Position,
         /// For how many ms a contact must be steady, at most 500.
         pub debounce_ms: u64 = 20,
     }
@@ -35,6 +43,8 @@ impl ButtonsSection {
             chip: self.chip.clone()?,
             reset: self.reset,
             switch: self.switch,
+            switch_kind: self.switch_kind,
+            reset_starts: self.reset_starts,
             debounce: Duration::from_millis(self.debounce_ms),
         })
     }

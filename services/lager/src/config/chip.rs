@@ -1,4 +1,4 @@
-//! `[chip]`: finds the boards' real images and their emulator.
+//! `[chip]`: finds the boards' real images, their bootloaders and their emulator.
 //!
 //! The emulator is a separate program, because it contains GPL-3 code; this program does not link
 //! it. This module looks for the emulator and the images beside this program, as in an
@@ -98,6 +98,9 @@ const SLOW_STEERING: Part = Part {
     ..STEERING
 };
 const SLOW_IMAGES: &str = "firmware/avr/target/images/9600";
+/// Where the Debian package has the files for a programmer and for `lager board update`.
+const INSTALLED: &str = "share/lager/images";
+const SLOW_INSTALLED: &str = "share/lager/images/9600";
 const BUILD_SLOW_IMAGES: &str =
     "build both images with `firmware/avr/build --baud 9600`, which says what it needs";
 
@@ -111,6 +114,21 @@ impl ChipSection {
         let current = std::env::current_dir().unwrap_or_default();
         let program = program.parent().unwrap_or(Path::new("/"));
         self.parts_near(program, &current, baud)
+    }
+
+    /// A board's .hex file of this machine, such as `sensor.hex`, for boards at `baud`.
+    ///
+    /// # Errors
+    /// It is missing. The sentence says how to get it.
+    pub fn hex(&self, name: &str, baud: u32) -> Result<PathBuf, String> {
+        let program = std::env::current_exe().unwrap_or_default();
+        let current = std::env::current_dir().unwrap_or_default();
+        hex_near(
+            program.parent().unwrap_or(Path::new("/")),
+            &current,
+            name,
+            baud,
+        )
     }
 
     fn parts_near(&self, program: &Path, current: &Path, baud: u32) -> Result<Parts, MissingParts> {
@@ -158,17 +176,36 @@ impl Part {
                 ))
             };
         }
-        let trees = program.ancestors().chain(current.ancestors());
-        core::iter::once(program.join(self.name))
-            .chain(trees.map(|tree| tree.join(self.built).join(self.name)))
-            .find(|path| path.is_file())
-            .ok_or_else(|| {
-                format!(
-                    "there is no {}/{}; {command}, or name it in the configuration's [chip] {key}",
-                    self.built, self.name
-                )
-            })
+        near(program, current, &[self.built], self.name).ok_or_else(|| {
+            format!(
+                "there is no {}/{}; {command}, or name it in the configuration's [chip] {key}",
+                self.built, self.name
+            )
+        })
     }
+}
+
+/// A file beside this program, or in one of these folders of a tree that this program or the
+/// current folder lies in.
+fn near(program: &Path, current: &Path, folders: &[&str], name: &str) -> Option<PathBuf> {
+    let trees = program.ancestors().chain(current.ancestors());
+    let inside = trees.flat_map(|tree| folders.iter().map(|folder| tree.join(folder).join(name)));
+    core::iter::once(program.join(name))
+        .chain(inside)
+        .find(|path| path.is_file())
+}
+
+fn hex_near(program: &Path, current: &Path, name: &str, baud: u32) -> Result<PathBuf, String> {
+    let (folders, command) = match baud {
+        SLOW => ([SLOW_IMAGES, SLOW_INSTALLED], BUILD_SLOW_IMAGES),
+        _ => ([IMAGES, INSTALLED], BUILD_IMAGES),
+    };
+    near(program, current, &folders, name).ok_or_else(|| {
+        format!(
+            "there is no {}/{name}; {command}, or name the file",
+            folders[0]
+        )
+    })
 }
 
 #[cfg(test)]
@@ -235,6 +272,24 @@ mod tests {
             ..parts
         };
         assert_eq!(chip.parts_near(elsewhere, &inside, SLOW), Ok(slow));
+    }
+
+    #[test]
+    fn a_file_for_a_programmer_is_found_in_the_tree_and_where_the_package_has_it() {
+        let (tree, root) = (Folder::new("hex"), Folder::new("installed"));
+        let elsewhere = Path::new("/");
+        let bin = root.0.join("usr/bin");
+        let found = |program: &Path, baud| hex_near(program, elsewhere, "sensor.hex", baud);
+        let told = found(&bin, 500_000).expect_err("nothing is there");
+        assert!(told.contains("firmware/avr/build`"), "{told}");
+        let built = tree.put("firmware/avr/target/images/sensor.hex");
+        assert_eq!(found(&tree.0.join("target/debug"), 500_000), Ok(built));
+        let fast = root.put("usr/share/lager/images/sensor.hex");
+        assert_eq!(found(&bin, 500_000), Ok(fast));
+        let told = found(&bin, SLOW).expect_err("not for this rate");
+        assert!(told.contains("build --baud 9600"), "{told}");
+        let slow = root.put("usr/share/lager/images/9600/sensor.hex");
+        assert_eq!(found(&bin, SLOW), Ok(slow));
     }
 
     #[test]

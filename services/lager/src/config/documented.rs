@@ -3,23 +3,39 @@
 use std::fmt::Write as _;
 use std::sync::LazyLock;
 
-use lager_wire::ArmProfile;
+use lager_wire::{ArmProfile, LineProfile, RangerProfile, WheelsProfile};
 
 use super::realtime::CoresSection;
 use super::section::{Declared, Section};
 use super::{
-    BusSection, ButtonsSection, ChipSection, CommSection, Config, GatewaySection, LogSection,
-    LogicSection, RealtimeSection, SerialSection, SimulatorSection, StationSection,
+    BatterySection, BusSection, ButtonsSection, ChipSection, CommSection, Config, GatewaySection,
+    LogSection, LogicSection, RealtimeSection, SerialSection, SimulatorSection, StationSection,
 };
 
 /// Every section, in the order of the file.
-const SECTIONS: [Section; 18] = [
+const SECTIONS: [Section; 22] = [
     Config::SECTION,
     LogSection::SECTION,
     BusSection::SECTION,
     RealtimeSection::SECTION,
     CoresSection::SECTION,
     SerialSection::SECTION,
+    Section {
+        name: "wheels",
+        about: WheelsProfile::ABOUT,
+        keys: WheelsProfile::KEYS,
+    },
+    Section {
+        name: "line",
+        about: LineProfile::ABOUT,
+        keys: LineProfile::KEYS,
+    },
+    Section {
+        name: "distance",
+        about: RangerProfile::ABOUT,
+        keys: RangerProfile::KEYS,
+    },
+    BatterySection::SECTION,
     Section {
         name: "arm",
         about: ArmProfile::ABOUT,
@@ -152,8 +168,9 @@ fn lines_of<'a>(values: &'a str, section: &str) -> impl Iterator<Item = &'a str>
 mod tests {
     use super::super::{Body, Waiting};
     use super::*;
+    use lager_bridge::buttons::SwitchKind;
     use lager_comm::LinkLost;
-    use lager_wire::{ArmLimits, JointLimits};
+    use lager_wire::{ArmLimits, IrModel, JointLimits};
 
     #[test]
     fn the_documented_file_reads_back_with_every_key() {
@@ -161,8 +178,9 @@ mod tests {
             name: "r7".into(),
             speed: 2.5,
             body: Body::Serial,
-            warehouse: "a \"quoted\" name".into(),
+            warehouse: Some("a \"quoted\" name".into()),
             state: Some("/var/lib/lager".into()),
+            robot: Some("/etc/lager/robot.toml".into()),
             log: LogSection {
                 file: Some("/var/log/lager".into()),
                 json: true,
@@ -179,6 +197,22 @@ mod tests {
                     bridge: [0, 2].into_iter().collect(),
                     ..CoresSection::default()
                 },
+            },
+            wheels: WheelsProfile {
+                swapped: true,
+                duty: 120,
+                ..WheelsProfile::default()
+            },
+            line: LineProfile {
+                dark_is_high: false,
+            },
+            distance: RangerProfile {
+                model: IrModel::Own,
+                near_cm: 12,
+                ..RangerProfile::default()
+            },
+            battery: BatterySection {
+                divider: Some(false),
             },
             arm: ArmProfile {
                 torque_limit: 700,
@@ -216,6 +250,8 @@ mod tests {
                 chip: Some("/dev/gpiochip4".into()),
                 reset: Some(5),
                 switch: Some(6),
+                switch_kind: SwitchKind::Press,
+                reset_starts: false,
                 debounce_ms: 30,
             },
             gateway: GatewaySection {
@@ -243,7 +279,7 @@ mod tests {
         let head = "# The robot's name: the middle part of every topic's name.\nname = \"r1\"\n";
         assert!(text.starts_with(head), "{text}");
         assert!(
-            text.contains("\n# reset = ...\n# The line of the mode switch"),
+            text.contains("\n# reset = ...\n# Whether a press of reset"),
             "{text}"
         );
         assert!(!text.contains("log = ..."), "{text}");

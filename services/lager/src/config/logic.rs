@@ -17,8 +17,6 @@ const CRUISES_MM_PER_S: RangeInclusive<f32> = 10.0..=1_000.0;
 /// the axle would be on a node as soon as they see it. If they were farther than the smallest
 /// square's side, they would be past the next node.
 const SENSORS_AHEAD_MM: RangeInclusive<f32> = 20.0..=400.0;
-/// The same for turns on the spot, in degrees per second.
-const TURNS_DEG_PER_S: RangeInclusive<f32> = 5.0..=180.0;
 /// The same for the tape's width: on wider tape a crossing is not a mark any more.
 const TAPES_MM: RangeInclusive<f32> = 5.0..=50.0;
 /// The same for the ranger's place.
@@ -30,12 +28,10 @@ section! {
     "logic"
     /// The measures of the robot that the navigator drives.
     pub struct LogicSection {
-        /// Speed in mm/s when both motors run at the standard duty of 100.
+        /// Speed in mm/s when both motors run at the duty of [wheels].
         pub cruise_mm_per_s: f32 = LogicConfig::default().cruise_mm_per_s,
         /// How far the line sensors are ahead of the wheels' axle, in mm.
         pub sensor_ahead_mm: f32 = LogicConfig::default().sensor_ahead_mm,
-        /// Speed of a turn on the spot at that duty, in degrees per second.
-        pub turn_deg_per_s: f32 = LogicConfig::default().turn_deg_per_s,
         /// Width of the tape, in mm.
         pub tape_mm: f32 = LogicConfig::default().tape_mm,
         /// How far the ranger at the front is ahead of the wheels' axle, in mm.
@@ -73,7 +69,6 @@ impl LogicSection {
         for (key, value, range) in [
             ("cruise_mm_per_s", self.cruise_mm_per_s, CRUISES_MM_PER_S),
             ("sensor_ahead_mm", self.sensor_ahead_mm, SENSORS_AHEAD_MM),
-            ("turn_deg_per_s", self.turn_deg_per_s, TURNS_DEG_PER_S),
             ("tape_mm", self.tape_mm, TAPES_MM),
             ("ranger_ahead_mm", self.ranger_ahead_mm, RANGERS_AHEAD_MM),
         ] {

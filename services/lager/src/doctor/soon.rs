@@ -11,14 +11,13 @@ use lager_lines::extension::Finding;
 use super::{OPEN_FILES, SHARED_MEMORY_MIB, free_shared_memory, most_open_files};
 use crate::overload::Load;
 
-/// How this machine is. The services are for comm to add.
+/// How this machine is.
 pub fn machine() -> Machine {
     let load = Load::now();
     Machine {
         load_percent: load.map(|load| load.percent()),
         cores: load.and_then(|load| u16::try_from(load.cores()).ok()),
         memory_mib: memory(&fs::read_to_string("/proc/meminfo").unwrap_or_default()),
-        services: Vec::new(),
         found: findings(load),
     }
 }

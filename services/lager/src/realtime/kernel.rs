@@ -39,6 +39,12 @@ pub fn granted() -> io::Result<CoreSet> {
 
 /// Keeps all memory of this process in RAM, also memory that it maps later.
 ///
+/// What is mapped now is the program and its libraries, which would have to come from the disk, so
+/// the kernel reads all of it. Later mappings are stacks, the heap and segments of the bus, most of
+/// which nobody ever touches: each page is locked from its first use on, which takes no disk. 5 s
+/// after its start a robot on a mission meets no page for the first time any more (2026-11-28,
+/// x86-64). To fill all of them took 35 MiB more for bridge and logic together.
+///
 /// The C library's allocator would reserve 64 MiB of addresses for each thread. All of them would
 /// count as locked although they are never filled, so all threads share the first thread's reserve.
 pub fn lock_memory() -> io::Result<()> {
@@ -47,8 +53,9 @@ pub fn lock_memory() -> io::Result<()> {
     unsafe {
         libc::mallopt(libc::M_ARENA_MAX, 1);
     }
+    rustix::mm::mlockall(MlockAllFlags::CURRENT)?;
     Ok(rustix::mm::mlockall(
-        MlockAllFlags::CURRENT | MlockAllFlags::FUTURE,
+        MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT,
     )?)
 }
 

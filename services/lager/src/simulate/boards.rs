@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lager_plant::Warehouse;
 use lager_simulator::Wire;
-use lager_topics::{ArmProfileState, Ask, AskKind, Health, Phase, Refusal, StopCause};
+use lager_topics::{Ask, AskKind, Health, Phase, ProfileState, Refusal, StopCause};
 use lager_wire::ResetCause;
 
 use super::Whole;
@@ -53,7 +53,7 @@ fn run_until(whole: &mut Whole, what: &str, wanted: impl Fn(&Health) -> bool) {
 }
 
 fn obeys_arm(health: &Health) -> bool {
-    health.arm_profile == ArmProfileState::Accepted
+    health.arm_profile == ProfileState::Accepted
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn a_board_that_is_silent_for_two_seconds_stands_and_is_told_everything_again() 
     let health = run(&mut whole, ms(1_690));
     assert_eq!(health.blocked, Refusal::NoBoard);
     assert_eq!(health.steering.up, 0);
-    assert_eq!(health.arm_profile, ArmProfileState::NoBoard);
+    assert_eq!(health.arm_profile, ProfileState::NoBoard);
 
     whole.robot.cut(Wire::Steering, false);
     let told_again = |health: &Health| {
@@ -91,7 +91,7 @@ fn a_board_that_resets_is_told_everything_again() {
         };
         run_until(&mut whole, "it has restarted", reset);
         if wire == Wire::Steering {
-            assert_eq!(health(&whole).arm_profile, ArmProfileState::Telling);
+            assert_eq!(health(&whole).arm_profile, ProfileState::Telling);
         }
         run_until(&mut whole, "it is told [arm] again", obeys_arm);
         assert_eq!(health(&whole).stopped, 0);

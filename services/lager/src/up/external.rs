@@ -137,7 +137,7 @@ fn station_for(config: &mut Config) -> Result<External> {
             listener: None,
             panel: None,
             gateway: Vec::new(),
-            told: "there is no external computer; the warehouse is told here".into(),
+            told: format!("there is no external computer; {}", told_here(config)),
         });
     }
     if let Some(address) = config.station.address.clone() {
@@ -199,6 +199,14 @@ fn station_for(config: &mut Config) -> Result<External> {
     })
 }
 
+/// Where the robot's warehouse comes from without an external computer.
+fn told_here(config: &Config) -> &'static str {
+    match config.warehouse_name() {
+        Some(_) => "the warehouse is told here",
+        None => "nobody tells the robot its warehouse: --warehouse FILE names one",
+    }
+}
+
 /// There is no external computer.
 fn none(config: &mut Config, why: &anyhow::Error) -> External {
     config.station.wanted = false;
@@ -206,7 +214,10 @@ fn none(config: &mut Config, why: &anyhow::Error) -> External {
         listener: None,
         panel: None,
         gateway: Vec::new(),
-        told: format!("there is no external computer: {why:#}; the warehouse is told here"),
+        told: format!(
+            "there is no external computer: {why:#}; {}",
+            told_here(config)
+        ),
     }
 }
 
@@ -231,7 +242,7 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
 /// A robot of this user on this bus that is up, was started with the same warehouse, and has a
 /// station of its own at the usual address.
 fn neighbour(config: &Config) -> Result<Option<Config>> {
-    let warehouse = config.warehouse()?;
+    let warehouse = config.known_warehouse()?;
     let is_it = |theirs: &Config| {
         let gag = match &theirs.station.gag {
             Some(gag) => Ok(gag.clone()),
@@ -242,7 +253,9 @@ fn neighbour(config: &Config) -> Result<Option<Config>> {
             .unwrap_or(false);
         serves
             && theirs.station.address.as_deref() == Some(StationSection::USUAL)
-            && theirs.warehouse().is_ok_and(|theirs| theirs == warehouse)
+            && theirs
+                .known_warehouse()
+                .is_ok_and(|theirs| theirs == warehouse)
     };
     Ok(others(config)?.into_iter().find(is_it))
 }

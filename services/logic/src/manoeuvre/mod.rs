@@ -36,7 +36,7 @@ pub(crate) use back_up::BackUp;
 pub(crate) use behaviour::Behaviour;
 pub(crate) use fold::Fold;
 pub(crate) use follow::{Ahead, Follow, Until};
-pub(crate) use helm::{Helm, STANDBY, Senses};
+pub(crate) use helm::{Helm, STANDBY, Senses, is_no_line};
 pub(crate) use look::Look;
 pub(crate) use search::Search;
 pub(crate) use stand::Stand;

@@ -15,7 +15,7 @@ use crate::belief::{Belief, Doubt};
 use crate::by_hand::ByHand;
 use crate::command::Standing;
 use crate::config::LogicConfig;
-use crate::manoeuvre::{Behaviour, STANDBY};
+use crate::manoeuvre::{Behaviour, STANDBY, is_no_line};
 use crate::marks::MarkReader;
 use lager_floor::{Node, Spin};
 
@@ -51,6 +51,7 @@ impl Navigator {
             forced: mission.forced.into(),
             remedy: self.remedy().into(),
             pick: mission.pick.into(),
+            at_start: self.is_at_start().into(),
             ..NavigatorStatus::default()
         };
         if let Some((heard, distance_cm)) = senses.distance {
@@ -61,6 +62,32 @@ impl Navigator {
         self.manoeuvre.fill(&mut status);
         mission.place.doubt.fill(&mut status);
         status
+    }
+
+    /// Whether it stands on the delivery node, looks into the warehouse, sees tape there, and has
+    /// not moved since somebody put it there. It may have begun an order.
+    fn is_at_start(&self) -> bool {
+        let (mission, senses) = (&self.mission, &self.senses);
+        let Some(map) = mission.map.as_ref().filter(|_| mission.has_a_place()) else {
+            return false;
+        };
+        let Belief { node, heading, .. } = mission.place;
+        let sees_tape = senses.sure_sight.is_some_and(|seen| !is_no_line(seen));
+        let (moved_mm, turned_deg) = (senses.odometer.travelled_mm, senses.odometer.turned_deg);
+        let has_not_left = matches!(
+            mission.phase,
+            Phase::WaitingForOrder
+                | Phase::Turning
+                | Phase::Looking
+                | Phase::Driving
+                | Phase::Approaching
+        );
+        (node, heading) == (map.grid.delivery(), map.grid.exit().back())
+            && mission.place.doubt.is_none()
+            && has_not_left
+            && moved_mm.abs() < 1.0
+            && turned_deg.abs() < 1.0
+            && sees_tape
     }
 
     /// The remedy: what makes a standing robot go on, if a person must act.

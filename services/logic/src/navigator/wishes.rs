@@ -48,8 +48,10 @@ impl Navigator {
             .get()
             .map(|heading| (Node::new(wish.x, wish.y), heading));
         match kind {
-            // The bridge handles the switch (E14), and its health then has the mode.
-            InputKind::SwitchedToManual | InputKind::SwitchedToAutonomous => return,
+            // The bridge handles the switch (E14) and the start, and its health then has the effect.
+            InputKind::SwitchedToManual
+            | InputKind::SwitchedToAutonomous
+            | InputKind::StartPressed => return,
             InputKind::Horn => return out.think(ThoughtKind::Honks),
             InputKind::LinkLost | InputKind::LinkBack => {
                 return self.take_link(now, kind == InputKind::LinkLost, out);
@@ -250,7 +252,7 @@ impl Navigator {
 
     fn watch_manual_driving(&mut self, now: Duration, sum: u64, out: &mut Output) {
         let known = self.by_hand.to_status();
-        let driven_mm = self.by_hand.take(sum, self.config.cruise_mm_per_s);
+        let driven_mm = self.by_hand.take(sum, &self.config);
         out.status_changed |= self.by_hand.to_status() != known;
         if self.mission.has_a_place() && driven_mm > DISPLACED_MM {
             let why = Ending::Failed(FailureKind::DrivenByHand, DISPLACED_MM, driven_mm);

@@ -6,6 +6,7 @@ use lager_floor::{Heading, Node};
 use lager_logic::{Input, LogicConfig, Navigator};
 use lager_orders::Mode;
 use lager_topics::{EventKind, FailureKind, Finish, InputKind, Phase, Remedy, WarehouseMap};
+use lager_wire::LineState;
 
 use crate::double::{Body, Trouble};
 use crate::floor::{Exit, Floor};
@@ -479,4 +480,46 @@ fn an_obstacle_free_distance_is_passed_on() {
     let mut trial = mission();
     trial.tell(Input::Distance(37));
     assert_eq!(trial.navigator.status().distance_cm, 37);
+}
+
+#[test]
+fn it_says_whether_it_stands_at_the_start_and_a_press_that_starts_it_keeps_its_order() {
+    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Heading::Right)]);
+    let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
+    let is_at_start = |trial: &Trial| trial.navigator.status().at_start == 1;
+    assert!(!is_at_start(&trial), "it has not seen the tape");
+    stop(&mut trial, true);
+    trial.run_for(SECOND / 2);
+    assert!(is_at_start(&trial), "{}", trial.story());
+
+    // Somebody says that it stands elsewhere, and then that it stands at the start.
+    trial.press_at(InputKind::Placed, (1, 1), Heading::Left);
+    trial.run_for(SECOND / 10);
+    assert!(!is_at_start(&trial));
+    trial.press(InputKind::ResetPressed, 0);
+    trial.run_for(SECOND / 10);
+    assert!(is_at_start(&trial));
+
+    // Beside the tape.
+    let mut beside = trial.clone();
+    for _ in 0..2 {
+        beside.tell(Input::Line(LineState::NotOnLine));
+    }
+    assert!(!is_at_start(&beside));
+
+    // It has begun an order and not moved, and the press is no reset.
+    trial.order(1, 1);
+    trial.run_for(SECOND / 2);
+    assert!(is_at_start(&trial), "{}", trial.story());
+    assert_ne!(trial.phase(), Phase::WaitingForOrder);
+    trial.press(InputKind::StartPressed, 0);
+    stop(&mut trial, false);
+    trial.run_for(SECOND * 2);
+    assert!(!is_at_start(&trial), "it has left");
+    trial.deliver(1);
+    assert_eq!(trial.count(EventKind::Refused), 0, "{}", trial.story());
+
+    // Nobody knows where a navigator is whose predecessor left no state.
+    let lost = Navigator::lost(LogicConfig::default());
+    assert_eq!(lost.status().at_start, 0);
 }

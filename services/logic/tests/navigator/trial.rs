@@ -81,6 +81,8 @@ fn is_news(before: &NavigatorStatus, after: &NavigatorStatus) -> bool {
         turned_deg: 0,
         distance_cm: 0,
         distance_age_ms: 0,
+        // It follows from how far the robot has moved and what it sees.
+        at_start: 0,
         ..*status
     };
     steady(before) != steady(after)

@@ -36,6 +36,7 @@ const SIGNING: [&str; 3] = ["comm", "station", "gateway"];
 pub(crate) struct Feed<'a> {
     bus: &'a Bus,
     watchdog: &'a Watchdog,
+    load: fn() -> Load,
     open: BTreeMap<String, Box<dyn Pull>>,
     /// Topics that could not be read at the last look, such as one with no place left.
     refused: BTreeSet<String>,
@@ -58,12 +59,17 @@ impl<'a> Feed<'a> {
     ///
     /// # Errors
     /// There are too many observers, or a process of another build.
-    pub(crate) fn new(bus: &'a Bus, watchdog: &'a Watchdog) -> Result<Self, ToolError> {
+    pub(crate) fn new(
+        bus: &'a Bus,
+        watchdog: &'a Watchdog,
+        load: fn() -> Load,
+    ) -> Result<Self, ToolError> {
         let open = || -> Result<Self, PortError> {
             let clock = bus.clock();
             Ok(Self {
                 bus,
                 watchdog,
+                load,
                 open: BTreeMap::new(),
                 refused: BTreeSet::new(),
                 services: BusWatch::of_services(),
@@ -99,7 +105,7 @@ impl<'a> Feed<'a> {
         let word = bus.home().unit(bus.unit()).join(StopPage::FILE);
         let told = StopWord::read(&word).ok().flatten();
         model.head.stop = told.and_then(|told| told.stop());
-        model.head.load = load();
+        model.head.load = (self.load)();
         let (then, robot_then) = self.clocked;
         self.clocked = (Instant::now(), self.clock.now());
         let real = (self.clocked.0 - then).as_secs_f64();
@@ -312,15 +318,5 @@ fn life(pid: u32) -> Life {
         Some('T' | 't') => Life::Frozen,
         Some('Z' | 'X') | None => Life::Dead,
         _ => Life::Alive,
-    }
-}
-
-/// The load of the machine.
-fn load() -> Load {
-    let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    let minute = text.split(' ').next().and_then(|text| text.parse().ok());
-    Load {
-        minute: minute.unwrap_or_default(),
-        cores: std::thread::available_parallelism().map_or(1, usize::from),
     }
 }

@@ -14,11 +14,11 @@ use serde_json::{Value, json};
 
 /// The load of the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Load {
+pub struct Load {
     /// How many processes want a core, on average over a minute.
-    pub(crate) minute: f64,
+    pub minute: f64,
     /// Cores.
-    pub(crate) cores: usize,
+    pub cores: usize,
 }
 
 /// A process of the robot that stands still.
@@ -132,6 +132,15 @@ impl Head {
         )
     }
 
+    /// What is wrong with the image of a board that is up, 0 the sensor board and 1 the steering
+    /// board.
+    pub(crate) fn misfit(&self, place: usize) -> Option<String> {
+        let health = self.health.as_ref()?;
+        let board = [&health.sensor, &health.steering][place];
+        let misfit = board.misfit().filter(|_| board.up != 0)?;
+        Some(misfit.to_string())
+    }
+
     pub(crate) fn mission(&self) -> String {
         let Some(status) = &self.status else {
             return "no navigator".to_owned();
@@ -187,6 +196,7 @@ impl Head {
                 "up": board.up != 0, "age_ns": age, "lost": board.lost_total,
                 "bad_crc": board.bad_crc, "skipped_bytes": board.skipped_bytes,
                 "reboots": board.reboots, "load_percent": board.board_load_percent,
+                "build": board.build, "fits": board.misfit().is_none(),
             }))
         };
         let path: serde_json::Map<String, Value> = self

@@ -36,6 +36,7 @@ use serde::de::IntoDeserializer;
 use serde_json::{Value, json};
 
 use self::feed::Feed;
+pub use self::head::Load;
 use self::model::{Key, Model, Pressed};
 use crate::{POLL, ToolError, Tools};
 
@@ -45,7 +46,7 @@ const WINDOW: Duration = Duration::from_secs(1);
 const ONCE: Rect = Rect::new(0, 0, 200, 200);
 
 /// What `lager top` shows first.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct TopConfig {
     /// Only topics whose names contain this.
     pub filter: String,
@@ -53,6 +54,8 @@ pub struct TopConfig {
     pub once: Option<Duration>,
     /// The robot's battery.
     pub pack: Pack,
+    /// How busy the machine is.
+    pub load: fn() -> Load,
 }
 
 impl<W: Write> Tools<'_, W> {
@@ -65,7 +68,7 @@ impl<W: Write> Tools<'_, W> {
         model.view.filter.clone_from(&config.filter);
         model.head.battery = Battery::new(config.pack);
         urgency::wake_with_others(POLL);
-        let mut feed = Feed::new(self.bus, self.watchdog)?;
+        let mut feed = Feed::new(self.bus, self.watchdog, config.load)?;
         feed.look(&mut model)?;
         model.end_window(Clock::monotonic_ns());
         let Some(long) = config.once else {

@@ -167,6 +167,9 @@ fn head(model: &Model, page: &mut Page<'_>) {
             false => plain(),
         };
         page.put(&format!("{name:9} {link}"), style);
+        if let Some(misfit) = head.misfit(place) {
+            page.put(&format!("{:9} {misfit}", ""), bad());
+        }
     }
     let mission = known(head.status.is_some(), head.mission());
     page.put(&format!("mission   {mission}"), plain());

@@ -215,6 +215,26 @@ fn the_keys_explain_themselves_and_a_stop_is_seen() {
     check("stopped-80x24.txt", &picture(&model, 80, 24));
 }
 
+#[test]
+fn an_image_that_does_not_fit_is_named_below_its_board() {
+    let mut model = driving();
+    let mut health = model.head.health.expect("a state");
+    (health.steering.version, health.steering.build) = (1, 1);
+    model.head.take_health(health, 10 * S);
+    let text = picture(&model, 120, 40);
+    let mut lines = text
+        .lines()
+        .skip_while(|line| !line.starts_with("steering"));
+    let below = lines.nth(1).expect("a line below");
+    let words = ["its image has build 1,", "`lager board update`"];
+    assert!(words.iter().all(|word| below.contains(word)), "{text}");
+    let told = model.head.as_json(10 * S);
+    assert_eq!(
+        (&told["steering"]["fits"], &told["sensor"]["fits"]),
+        (&false.into(), &true.into())
+    );
+}
+
 /// The topics in the order of the screen.
 fn topics(model: &Model) -> Vec<String> {
     model.shown().iter().map(|row| row.name.clone()).collect()

@@ -105,8 +105,8 @@ export class Bar {
   drawStop(robot) {
     const { resumePlace, resume, resumeThen, stopAll } = this.parts;
     const isStopped = robot?.state.stopped === "1";
-    stopAll.hidden = this.link.robots.size < (robot || !named() ? 2 : 1);
-    resumePlace.hidden = resume.hidden = !isStopped;
+    stopAll.toggleAttribute("hidden", this.link.robots.size < (robot || !named() ? 2 : 1));
+    for (const part of [resumePlace, resume]) part.toggleAttribute("hidden", !isStopped);
     this.resume.draw(robot);
     if (robot && isStopped) put(resumeThen, after(robot));
     else if (this.wasStopped) this.stop.say(null);

@@ -4,6 +4,7 @@
 /** @import { Robot } from "../station/robot.js" */
 
 import { at } from "../parts/at.js";
+import { set } from "../parts/svg.js";
 import { named } from "../station/chosen.js";
 import { called, crossing, failure, reason, sentence } from "../words/sentences.js";
 import { put, say, span } from "../words/words.js";
@@ -62,9 +63,9 @@ export const age = (ms) => (ms < 60_000 ? `${Math.max(0, Math.floor(ms / 1_000))
  */
 export function face(link, robot, now) {
   if (!link.open && link.me === null && link.tries === 0) return { look: "none", said: sentence("face_connecting") };
-  if (!link.open && !robot) return { look: "unheard", said: lost(link), remedy: tooOld(link) };
+  if (!link.open && !robot) return { look: "unheard", said: sentences(lost(link)), remedy: tooOld(link) };
   if (robot && (!link.open || ((robot.speaks || !robot.connected) && robot.isStale(now)))) {
-    const why = link.open ? sentence("face_unheard", { robot: robot.name }) : lost(link);
+    const why = link.open ? sentence("face_unheard", { robot: robot.name }) : sentences(lost(link));
     const remedy = tooOld(link);
     const old = [robot.heard, robot.stated].filter(Number.isFinite);
     const heard = old.length ? age(now - Math.min(...old)) : null;
@@ -134,11 +135,12 @@ function silent({ state }) {
  * @param {Robot} robot
  * @returns {[string, ...string[]]}
  */
-function does({ state: { phase, next, product, hold, stopped: isStopped } }) {
-  const act = phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? "";
+function does({ state: { mode, phase, next, product, hold, stopped: isStopped } }) {
+  const isByHand = mode === "manual";
+  const act = isByHand ? say("by_hand") : phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? "";
   const held = hold && hold !== "none" && sentence(`hold_${hold}`);
   const isHalted = isStopped === "1";
-  const fetches = product !== undefined && say(isHalted ? "was_to_fetch" : "fetches", product);
+  const fetches = product !== undefined && say(isHalted || isByHand ? "was_to_fetch" : "fetches", product);
   const said = isHalted ? [say("stopped_short"), fetches] : [[act, fetches].filter(Boolean).join(", ")];
   const [first = "", ...rest] = [!isHalted && held, ...said, isHalted && held].flatMap((one) => one || []);
   return [first, ...rest];
@@ -169,9 +171,9 @@ function stopped(link, robot, more) {
  */
 function stopper(link, { state: { stop_cause: cause, stop_by: by }, events, stoppedSince: since }) {
   if (cause !== "ordered") return null;
-  if (by !== "comm") return by === "operator" ? say("by_operator") : by ?? null;
+  if (by !== "comm") return by ? called(by) : null;
   const asked = events.findLast(({ kind, words, at }) => kind === "asked" && words[1] === "stop" && Math.abs(at - (since ?? at)) < ASKED_MS);
-  return asked ? called(asked.words[0] ?? "", link.me) : say("by_comm");
+  return asked ? called(asked.words[0] ?? "", link.me) : called(by);
 }
 
 /**
@@ -203,14 +205,15 @@ const lost = (link) => (link.closed ? reason(link.closed) : say("lost"));
  */
 export function show({ look, said, since, by, proof, more, isDeaf }, robot) {
   const { body } = document;
-  body.dataset.look = look;
+  set(body, "data-look", look);
   body.classList.toggle("stale", look === "unheard" || look === "none");
   body.classList.toggle("stopped", robot?.state.stopped === "1");
-  at("shape").setAttribute("d", SHAPES[look]);
+  set(at("shape"), "d", SHAPES[look]);
   put(at("doing"), said ?? "");
   put(at("since"), since ?? "");
   const told = at("stop-said").textContent ? null : proof;
-  put(at("more"), sentences([by, told].filter(Boolean).join("; "), more));
+  const words = sentences([by, told].filter(Boolean).join("; "), more);
+  put(at("more"), words && at("stop-said").textContent ? `${words}.` : words);
   const name = robot?.name ?? named() ?? "";
   put(at("stop-word"), say("stop"));
   put(at("stop-whom"), (isDeaf && sentence("face_deaf", { robot: name })) || name);

@@ -62,7 +62,8 @@ export class Notify {
     /** @type {Need[]} */
     const needy = all.flatMap((one) => (isNeedy(one) ? one : (alarm(one.robot, now) ?? [])));
     const title = needy.map(({ robot, said }) => `${robot.name}: ${said}`).join("; ");
-    document.title = title ? `! ${title}` : this.title;
+    const called = title ? `! ${title}` : this.title;
+    if (document.title !== called) document.title = called;
     const before = this.needing;
     this.needing = new Map(needy.map((one) => [key(one), before.get(key(one)) ?? { since: now, isTold: false }]));
     for (const one of needy) {

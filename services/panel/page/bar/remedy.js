@@ -20,10 +20,10 @@ const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_
  */
 export function drawRemedy(button, { remedy }, choose = null) {
   const control = document.getElementById((remedy && REMEDIES[remedy]) || "");
-  button.hidden = !(control instanceof HTMLButtonElement);
+  button.toggleAttribute("hidden", !(control instanceof HTMLButtonElement));
   if (!(control instanceof HTMLButtonElement)) return;
   put(button, control.textContent);
-  button.disabled = !choose && control.disabled;
+  button.toggleAttribute("disabled", !choose && control.disabled);
   button.onclick = () => {
     choose?.();
     control.click();

@@ -5,6 +5,7 @@
 /** @import { Robot } from "../station/robot.js" */
 /** @typedef {{ button: HTMLElement, said: HTMLElement }} Held A button that is held, and where it is told why not. */
 
+import { set } from "../parts/svg.js";
 import { called, reason } from "../words/sentences.js";
 import { put, say } from "../words/words.js";
 
@@ -129,7 +130,7 @@ export class Resume {
     // What is held ends the stop that it was held for, and no newer one.
     else if (held && held.robot.state.stop !== held.stop) this.letGo("stopped_again");
     for (const { button, said } of this.buttons) {
-      button.setAttribute("aria-disabled", String(robot?.state.stopped === "1" && this.forbidden(robot) !== null));
+      set(button, "aria-disabled", String(robot?.state.stopped === "1" && this.forbidden(robot) !== null));
       if (robot?.state.stopped !== "1") put(said, "");
     }
   }

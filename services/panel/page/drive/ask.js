@@ -142,7 +142,7 @@ export class Asked {
   draw(robot) {
     const { box, said } = this.parts;
     const who = robot?.driver && robot.driver === this.link.me ? robot.asks : null;
-    box.hidden = !who;
+    box.toggleAttribute("hidden", !who);
     put(said, who ? say("asks", called(who)) : "");
   }
 }

@@ -197,7 +197,7 @@ export class Driving {
     const isOff = this.objection() !== null;
     for (const part of [this.parts.pad, this.parts.arm]) part.classList.toggle("off", isOff);
     if (this.robot()?.state.stopped !== "1") this.isOfStop = false;
-    this.parts.resume.hidden = !this.isOfStop;
+    this.parts.resume.toggleAttribute("hidden", !this.isOfStop);
   }
 
   /**

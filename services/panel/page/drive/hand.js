@@ -54,7 +54,7 @@ export class ByHand {
 
   leave() {
     this.asked = null;
-    this.parts.box.hidden = true;
+    this.parts.box.toggleAttribute("hidden", true);
   }
 
   /** @param {Robot | null} robot */
@@ -65,7 +65,7 @@ export class ByHand {
     if (robot !== asked.robot || robot.driver !== this.link.me || robot.state.mode !== "autonomous") return this.leave();
     const left = asked.at - performance.now();
     if (left <= 0) return this.leave();
-    parts.box.hidden = false;
+    parts.box.toggleAttribute("hidden", false);
     put(parts.said, say("hand_asked", asked.product, Math.ceil(left / 1_000)));
   }
 }

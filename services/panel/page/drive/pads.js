@@ -83,6 +83,13 @@ export class Pads {
     this.speaks = null;
     /** The way in which the speed was turned at the last reading: 1, -1 or 0. A press counts once. */
     this.turned = 0;
+    this.listens = false;
+  }
+
+  /** Hears of pads that come and go. A browser that somebody listens to looks for them all the time. */
+  listen() {
+    if (this.listens) return;
+    this.listens = true;
     addEventListener("gamepadconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
     addEventListener("gamepaddisconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
   }
@@ -102,6 +109,7 @@ export class Pads {
    * @returns {number | null}
    */
   read() {
+    this.listen();
     const all = [...(navigator.getGamepads?.() ?? [])];
     const there = all.flatMap((pad, index) => (pad?.mapping === "standard" && pad.connected !== false ? [{ pad, index }] : []));
     for (const index of this.known.keys()) {

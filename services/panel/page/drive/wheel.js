@@ -57,6 +57,6 @@ export class Wheel {
     const other = driver ? say("control_other", called(driver)) : say("control_free");
     put(button, driver && driver === this.link.me ? say("control_mine") : other);
     // Who has the wheel is not known until the robot is heard again.
-    button.disabled = !this.link.open || !robot?.connected;
+    button.toggleAttribute("disabled", !this.link.open || !robot?.connected);
   }
 }

@@ -7,7 +7,7 @@
 import { battery } from "../bar/battery.js";
 import { face, SHAPES } from "../bar/face.js";
 import { drawRemedy } from "../bar/remedy.js";
-import { make } from "../parts/svg.js";
+import { make, set } from "../parts/svg.js";
 import { put, say } from "../words/words.js";
 
 /** The looks, the gravest first. */
@@ -36,7 +36,7 @@ export class Fleet {
    */
   draw(shown, now) {
     const robots = [...this.link.robots.values()];
-    this.tab.hidden = robots.length < 2;
+    this.tab.toggleAttribute("hidden", robots.length < 2);
     if (this.tab.hidden) return;
     const states = robots.map((robot) => ({ robot, state: face(this.link, robot, now) }));
     /** @param {{ state: Face }} one */
@@ -47,9 +47,9 @@ export class Fleet {
       // A row that stays in its place keeps the reader's focus.
       if (this.list.children[place] !== row.item) this.list.insertBefore(row.item, this.list.children[place] ?? null);
       const { button, remedy, shape, name, said, more } = row;
-      button.setAttribute("aria-pressed", String(robot === shown));
-      button.dataset.look = state.look;
-      shape.setAttribute("d", SHAPES[state.look]);
+      set(button, "aria-pressed", String(robot === shown));
+      set(button, "data-look", state.look);
+      set(shape, "d", SHAPES[state.look]);
       drawRemedy(remedy, state, () => this.choose(robot.name));
       put(name, robot.name);
       put(said, state.said ?? "");

@@ -2,23 +2,13 @@
 
 /** @import { Link } from "../station/link.js" */
 /** @import { Robot } from "../station/robot.js" */
-/** @import { Mark, Row } from "./model.js" */
+/** @import { Row } from "./model.js" */
 
 import { chain, isOld, losses, machine, services, versions } from "./model.js";
 import { age } from "../bar/face.js";
+import { MARKS } from "../parts/marks.js";
 import { make, set } from "../parts/svg.js";
 import { put, say } from "../words/words.js";
-
-/**
- * The shape of each mark, in a square of 20.
- *
- * @type {Record<Mark, string>}
- */
-export const MARKS = {
-  good: "M10 2a8 8 0 1 0 0 16a8 8 0 1 0 0-16M6.5 10l2.5 2.5 4.5-5",
-  bad: "M2 2h16v16H2zM7 7l6 6m0-6l-6 6",
-  unknown: "M10 2a8 8 0 1 0 0 16a8 8 0 1 0 0-16",
-};
 
 /** @typedef {{ item: HTMLLIElement, shape: SVGSVGElement, path: SVGPathElement, name: HTMLElement, value: HTMLElement, said: HTMLElement }} Drawn a row as it is drawn */
 

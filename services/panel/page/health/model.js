@@ -154,9 +154,12 @@ export function versions(link, robot) {
   const isApart = Boolean(link.release) && release !== undefined && release !== link.release;
   rows.push({ id: "release-robot", mark: release === undefined ? "unknown" : isApart ? "bad" : "good", name: robot.name, value: release ?? "\u2013", said: isApart ? say("health_update") : "" });
   for (const [board] of BOARDS) {
-    const version = robot.health?.[`${board}_version`];
-    const value = version === undefined ? "\u2013" : version === "0" ? say("health_original") : say("health_packets", version);
-    rows.push({ id: `release-${board}`, mark: version === undefined ? "unknown" : "good", name: say(`board_${board}`), value });
+    const [version, build, fits] = [robot.health?.[`${board}_version`], robot.health?.[`${board}_build`], robot.health?.program_build];
+    const value = version === undefined ? "\u2013" : version === "0" ? say("health_original") : say("health_packets", version, build ?? "\u2013");
+    // An original board has no build number, and a robot of an earlier release tells none.
+    const isApart = version !== undefined && version !== "0" && build !== undefined && build !== fits;
+    const helps = Number(build) < Number(fits) ? "health_board_old" : "health_board_new";
+    rows.push({ id: `release-${board}`, mark: version === undefined ? "unknown" : isApart ? "bad" : "good", name: say(`board_${board}`), value, said: isApart ? say(helps, fits) : "" });
   }
   return rows;
 }

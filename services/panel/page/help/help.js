@@ -4,8 +4,8 @@
 import { SHAPES } from "../bar/face.js";
 import { isText } from "../bar/stop.js";
 import { KEYS } from "../drive/drive.js";
-import { MARKS } from "../health/health.js";
 import { KINDS } from "../log/kinds.js";
+import { MARKS } from "../parts/marks.js";
 import { make } from "../parts/svg.js";
 import { say } from "../words/words.js";
 

@@ -58,13 +58,13 @@ export class Line {
     const at = (step) => [...steps.children].forEach((line, index) => (line.ariaCurrent = index === step ? "step" : null));
     const robot = this.robot();
     if (robot) robot.sensors = null;
-    calibrate.disabled = true;
+    calibrate.toggleAttribute("disabled", true);
     at(1);
     put(calibrationSaid, say("calibrating"));
     const { refused } = robot ? await this.link.act(robot, "calibrate") : { refused: say("no_robot") };
     at(2);
     put(calibrationSaid, refused ? reason(refused) : say("calibrated"));
-    calibrate.disabled = false;
+    calibrate.toggleAttribute("disabled", false);
   }
 
   /**
@@ -78,7 +78,7 @@ export class Line {
     this.gainsNow = p === undefined || d === undefined ? null : [p, d];
     put(this.parts.gainsNow, this.gainsNow ? say("gains_now", p, d) : say("gains_unset"));
     put(this.parts.gainsBack, this.gainsBefore ? say("put_back", ...this.gainsBefore) : "");
-    this.parts.gainsBack.hidden = !this.gainsBefore;
+    this.parts.gainsBack.toggleAttribute("hidden", !this.gainsBefore);
     if (this.gainsTyped || !this.gainsNow) return;
     [this.p.value, this.d.value] = this.gainsNow;
   }

@@ -2,7 +2,7 @@
 
 /** @import { Entry } from "../station/robot.js" */
 
-import { PLAIN, called, crossing, reason, sentence, thought } from "../words/sentences.js";
+import { called, crossing, plain, reason, sentence, thought } from "../words/sentences.js";
 import { say } from "../words/words.js";
 
 /** @typedef {"stop" | "help" | "goods" | "ways" | "persons" | "link" | "battery" | "settings"} Kind */
@@ -25,7 +25,7 @@ export const KINDS = {
 /** @type {Partial<Record<string, Kind>>} */
 const OF_EVENT = {
   stopped: "stop", resumed: "stop", failed: "help", refused: "help", pickup_refused: "help", in_position: "goods", getting_item: "goods",
-  item_delivered: "goods", mode: "persons", restarted: "link", link_lost: "link", link_back: "link",
+  item_delivered: "goods", mode: "persons", ended: "link", restarted: "link", link_lost: "link", link_back: "link",
 };
 /** @type {Partial<Record<string, Kind>>} */
 const OF_WISH = {
@@ -43,6 +43,7 @@ const OF_THOUGHT = [
   [/^(board|blind|sees_again|link|joint|parked_without_link)/, "link"],
   [/^(battery|parked)/, "battery"],
   [/^(map|picks)/, "settings"],
+  [/^(started_by_reset|reset_)/, "stop"],
   [/^(no_such|put_|arm_|honks)/, "persons"],
 ];
 
@@ -90,25 +91,17 @@ export function told({ kind, words, values }) {
 }
 
 /**
- * What a person calls the parts of a robot that stop it for him.
- *
- * @type {Partial<Record<string, string>>}
- */
-const BY = { comm: "by_comm", operator: "by_operator" };
-
-/**
  * What an event is about besides its place and its goods.
  *
  * @param {string[]} words
  */
 function about([first, second = ""]) {
   const cause = (first !== "none" && sentence(`stop_cause_${first}`)) || "\u2013";
-  const by = BY[second];
-  return { cause, by: by ? say(by) : second, mode: say(`mode_${first}`), service: first };
+  return { cause, by: called(second), mode: say(`mode_${first}`), service: first };
 }
 
 /**
- * Who at a page has asked for what.
+ * Who has asked for what, at a page or in a terminal.
  *
  * @param {string[]} words
  */
@@ -119,10 +112,12 @@ function asked([name = "", what = "", first = "", ...more]) {
     mode: () => say(`mode_${first}`),
     order: () => more[0],
     resume: () => "",
+    drive: () => "",
+    arm: () => "",
     obstacle: () => crossing(more.slice(0, 2).join()),
     place: () => [crossing(`${first},${more[0]}`), sentence(`looks_${more[1]}`)].join(" "),
   };
   // What takes no words is called as its button is.
-  if (PLAIN.includes(what)) return `${who}: ${[sentence(`do_${what}`), first].filter(Boolean).join(" ")}`;
+  if (plain().includes(what)) return `${who}: ${[sentence(`do_${what}`), first].filter(Boolean).join(" ")}`;
   return say(`did_${what}${["obstacle", "pick"].includes(what) ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
 }

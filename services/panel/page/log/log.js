@@ -95,7 +95,7 @@ export class Log {
     if (panel.hidden) return;
     const all = this.kept.all(robot);
     const shown = [robot?.name, all.length, all[0]?.at, all.at(-1)?.at, filter.value, [...this.kinds], this.most, current(), this.moment.at, this.choices].join();
-    earlier.disabled = !robot || this.kept.isFetching;
+    earlier.toggleAttribute("disabled", !robot || this.kept.isFetching);
     if (this.shown === shown) return;
     this.shown = shown;
     const kinds = all.map(kindOf);
@@ -104,7 +104,7 @@ export class Log {
     const words = filter.value.toLowerCase();
     const wanted = all.filter((entry) => (!this.kinds.size || this.kinds.has(kindOf(entry))) && (!words || this.row(entry).words.includes(words)));
     this.hasMore = wanted.length > this.most;
-    earlier.hidden = !this.hasMore && this.kept.isAll;
+    earlier.toggleAttribute("hidden", !this.hasMore && this.kept.isAll);
     this.fill(wanted.slice(-this.most).reverse().map((entry) => this.row(entry)));
     // The one that was chosen, of several at once, or else the last one that had happened by then.
     const at = this.moment.at;

@@ -223,7 +223,7 @@ export class Aim {
     const target = this.pointed ?? (hasKeys ? this.current() : null);
     this.map.drawCross((hasKeys && this.current()?.at) || null);
     const { what, does, why } = target ? this.offers(target) : {};
-    this.tip.hidden = !what;
+    this.tip.toggleAttribute("hidden", !what);
     const [name, act] = this.tip.children;
     if (!target || !what || !name || !act) return;
     put(name, what);

@@ -214,7 +214,7 @@ export class WarehouseMap {
    */
   draw(robot, others, now, state) {
     this.state = state;
-    this.svg.dataset.look = state?.look ?? "none";
+    set(this.svg, "data-look", state?.look ?? "none");
     put(this.words, this.describe(robot));
     if (robot) {
       this.ways.drawThings(robot, this.side, this.px);

@@ -23,9 +23,9 @@ export function obstacles(link, { said, undo }, robot) {
     const answer = take.done ? take : await link.act(shown, `obstacle put ${way}`);
     if (answer.refused) return put(said, reason(answer.refused));
     put(said, say(take.done ? "obstacle_taken" : "obstacle_put"));
-    undo.hidden = false;
+    undo.toggleAttribute("hidden", false);
     undo.onclick = async () => {
-      undo.hidden = true;
+      undo.toggleAttribute("hidden", true);
       const back = await link.act(shown, `obstacle ${take.done ? "put" : "take"} ${way}`);
       put(said, back.refused ? reason(back.refused) : say(take.done ? "obstacle_put" : "obstacle_taken"));
     };

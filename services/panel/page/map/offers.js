@@ -1,4 +1,5 @@
-// What the things on the map are, and what a click on one does now: the one place for tip and click.
+// What the things on the map are, and what a click on one does now: the one place for tip and click. A click offers only
+// what the robot can do: it has no order to go to a crossing, so a click on a crossing says where the robot stands.
 
 /** @import { Link } from "../station/link.js" */
 /** @import { Robot, Warehouse } from "../station/robot.js" */

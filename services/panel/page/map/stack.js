@@ -41,7 +41,7 @@ export class Stack {
     const { box } = this;
     this.before = document.activeElement;
     box.replaceChildren(...goods.map((id) => this.row(id, at)));
-    box.hidden = false;
+    box.toggleAttribute("hidden", false);
     beside(box, pixel, room, OFF_PX);
     box.querySelector("button")?.focus();
   }
@@ -50,7 +50,7 @@ export class Stack {
     const { box, before } = this;
     if (box.hidden) return;
     const isInside = box.contains(document.activeElement);
-    box.hidden = true;
+    box.toggleAttribute("hidden", true);
     if (isInside && before instanceof SVGElement) before.focus();
   }
 

@@ -46,7 +46,8 @@ export class Ways {
    */
   show(isShown, isKnown) {
     this.trail.toggleAttribute("hidden", !isShown);
-    for (const part of [this.gap, this.route, this.next]) part.toggleAttribute("hidden", !isKnown);
+    for (const part of [this.gap, this.route]) part.toggleAttribute("hidden", !isKnown);
+    if (!isKnown) this.next.toggleAttribute("hidden", true);
   }
 
   /**

@@ -7,8 +7,8 @@
 /** @import { Robot } from "../station/robot.js" */
 /** @typedef {(number | null)[]} Positions Of the servos; of one that is not heard it is null. */
 
-import { make } from "../parts/svg.js";
-import { say } from "../words/words.js";
+import { make, set } from "../parts/svg.js";
+import { put, say } from "../words/words.js";
 
 /** Radians of one unit of position, and the middle of the range. */
 const UNIT = ((300 / 1_023) * Math.PI) / 180;
@@ -36,22 +36,38 @@ export class Arm {
   constructor(svg) {
     this.svg = svg;
     this.shown = "";
+    /**
+     * The bar of each joint's load.
+     *
+     * @type {(SVGRectElement | null)[]}
+     */
+    this.bars = [];
   }
 
   /** @param {Robot | null} robot */
   draw(robot) {
     const { servos = "", loads = "", servo_errors: errors = "" } = robot?.state ?? {};
-    const shown = [servos, loads, errors, document.documentElement.lang].join(" ");
-    if (this.shown === shown) return;
-    this.shown = shown;
+    const shown = [servos, errors, document.documentElement.lang].join(" ");
+    if (this.shown !== shown) {
+      this.shown = shown;
+      this.drawPositions(read(servos), errors);
+    }
+    const all = loads.split(",").map(Number);
+    this.bars.forEach((bar, line) => bar && drawLoad(bar, JOINTS[line]?.[1] ?? [], all));
+  }
+
+  /**
+   * @param {Positions} positions
+   * @param {string} errors
+   */
+  drawPositions(positions, errors) {
     this.svg.replaceChildren();
-    this.svg.toggleAttribute("hidden", !servos);
-    const positions = read(servos);
-    const load = loads.split(",").map(Number);
+    this.svg.toggleAttribute("hidden", !positions.length);
+    this.bars = [];
     if (!positions.length) return;
     this.fromTheSide(positions);
     this.fromAbove(positions);
-    JOINTS.forEach(([word, indexes], line) => this.joint(line, word, indexes, positions, load));
+    this.bars = JOINTS.map(([word, indexes], line) => this.joint(line, word, indexes, positions));
     const told = ERRORS.filter((_, bit) => errors.at(-1 - bit) === "1");
     if (told.length) make("text", { class: "wrong", x: 0, y: 134 }, this.svg, `! ${told.map((word) => say(`servo_${word}`)).join(", ")}`);
   }
@@ -87,20 +103,33 @@ export class Arm {
    * @param {string} word
    * @param {[number, ...number[]]} servos
    * @param {Positions} positions
-   * @param {number[]} loads
+   * @returns {SVGRectElement | null} the bar of its load
    */
-  joint(line, word, [index, ...others], positions, loads) {
+  joint(line, word, [index], positions) {
     const y = 12 + line * 19;
     make("text", { x: 166, y: y + 4 }, this.svg, say(`servo_${word}`));
     make("rect", { class: "track", x: 228, y: y - 3, width: 56, height: 6 }, this.svg);
     const position = positions[index] ?? null;
-    if (position === null) return;
+    if (position === null) return null;
     make("circle", { cx: 228 + (position / 1_023) * 56, cy: y, r: 5 }, this.svg);
     make("text", { x: 294, y: y + 4 }, this.svg, String(position));
-    const load = Math.max(...[index, ...others].map((servo) => Math.abs(loads[servo] || 0)));
-    const bar = make("rect", { class: "load", x: 322, y: y - 3, width: (load / 1_023) * 26, height: 6 }, this.svg);
-    make("title", {}, bar, say("servo_load", Math.round((load / 1_023) * 100)));
+    const bar = make("rect", { class: "load", x: 322, y: y - 3, height: 6 }, this.svg);
+    make("title", {}, bar);
+    return bar;
   }
+}
+
+/**
+ * The most that a joint's servos are loaded; it changes all the time.
+ *
+ * @param {SVGRectElement} bar
+ * @param {number[]} servos
+ * @param {number[]} loads
+ */
+function drawLoad(bar, servos, loads) {
+  const part = Math.max(...servos.map((servo) => Math.abs(loads[servo] || 0))) / 1_023;
+  set(bar, "width", Math.round(part * 26));
+  if (bar.firstElementChild) put(bar.firstElementChild, say("servo_load", Math.round(part * 100)));
 }
 
 /**

@@ -8,7 +8,7 @@
 
 import { turnOf, wasDelivered } from "../map/goods.js";
 import { titleOf } from "../parts/parcel.js";
-import { PLAIN, reason, sentence } from "../words/sentences.js";
+import { plain, reason, sentence } from "../words/sentences.js";
 import { clock, put, say } from "../words/words.js";
 import { crossingsTo, learn, left, waits } from "./legs.js";
 import { Order, jobOf } from "./order.js";
@@ -102,7 +102,7 @@ export class Missions {
     parts.backNo.onclick = () => this.leave();
     parts.clear.onclick = () => this.takeBack("clear", waiting(this.robot()).map(({ product }) => product));
     parts.undo.onclick = () => this.undo();
-    this.plain = PLAIN.map((action) => {
+    this.plain = plain().map((action) => {
       const button = Object.assign(document.createElement("button"), { type: "button", id: `do-${action}` });
       button.onclick = () => this.act(action);
       return { action, button };
@@ -160,13 +160,13 @@ export class Missions {
     this.asked = asked;
     beside.after(back);
     put(backSaid, delivery ? say("back_delivered", name, clock(delivery.at)) : say("back_away", name));
-    back.hidden = false;
+    back.toggleAttribute("hidden", false);
     backNo.focus();
   }
 
   leave() {
     this.asked = null;
-    this.parts.back.hidden = true;
+    this.parts.back.toggleAttribute("hidden", true);
   }
 
   /** They are back: the robot is told so, and fetches them. */
@@ -259,12 +259,12 @@ export class Missions {
     const { picks, picked, undo } = this.parts;
     for (const { action, button } of this.plain) {
       put(button, sentence(`do_${action}`) ?? action);
-      button.disabled = !this.link.mayDrive;
+      button.toggleAttribute("disabled", !this.link.mayDrive);
     }
-    undo.hidden = !this.taken || this.taken.robot !== robot;
+    undo.toggleAttribute("hidden", !this.taken || this.taken.robot !== robot);
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";
-    picks.disabled = pick === undefined || !this.link.mayDrive;
+    picks.toggleAttribute("disabled", pick === undefined || !this.link.mayDrive);
     picked.parentElement?.toggleAttribute("hidden", !(robot?.state.phase === "picking" && (pick === "manual" || robot.state.remedy !== undefined)));
   }
 
@@ -290,8 +290,8 @@ export class Missions {
     }));
     this.queue.draw(rows, this.link.me, this.link.mayDrive);
     put(head, orders.length ? say("queue_head", orders.length, this.goods.size) : say("queue_empty"));
-    clear.disabled = !orders.length || !this.link.mayDrive;
-    this.parts.orderCancel.hidden = robot?.state.order === undefined || !this.link.mayDrive;
+    clear.toggleAttribute("disabled", !orders.length || !this.link.mayDrive);
+    this.parts.orderCancel.toggleAttribute("hidden", robot?.state.order === undefined || !this.link.mayDrive);
     const label = say("cancel_order", product ?? "");
     if (this.parts.orderCancel.title !== label) Object.assign(this.parts.orderCancel, { title: label, ariaLabel: label });
   }

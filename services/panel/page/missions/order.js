@@ -5,6 +5,7 @@
 /** @import { Ends, Known } from "./legs.js" */
 
 import { carries } from "../map/goods.js";
+import { set } from "../parts/svg.js";
 import { minutes, put, say } from "../words/words.js";
 import { ends, left } from "./legs.js";
 
@@ -39,7 +40,7 @@ export class Order {
   draw(robot, goods, known, now) {
     const { card, number, name, where, time } = this.parts;
     const product = robot?.state.product;
-    card.hidden = product === undefined;
+    card.toggleAttribute("hidden", product === undefined);
     if (!robot || product === undefined) return;
     const job = jobOf(robot, product);
     // A claw that has closed on nothing says that the goods are gone, too.
@@ -64,9 +65,8 @@ export class Order {
     const guessed = known && ends(job, known);
     const isAtOnce = job.asked && job.began !== undefined && job.began - job.asked.at < AT_ONCE_MS;
     this.steps.forEach(({ word, key, step, label, time }, index) => {
-      step.className = index < current ? "" : index === current ? "is" : "to";
-      if (index === current) step.setAttribute("aria-current", "step");
-      else step.removeAttribute("aria-current");
+      set(step, "class", index < current ? "" : index === current ? "is" : "to");
+      set(step, "aria-current", index === current ? "step" : "false");
       put(label, say(key === "began" && isAtOnce ? "step_asked" : word));
       put(time, key === null ? (current === CARRIES ? say("now") : "") : key === "began" ? began(job) : since(job, key, guessed, now));
     });

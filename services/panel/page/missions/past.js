@@ -29,9 +29,9 @@ export class Past {
     this.parts = parts;
     const { open, box, rest, goods, time } = parts;
     open.onclick = () => {
-      const isOpen = box.hidden;
-      box.hidden = !isOpen;
-      rest.hidden = isOpen;
+      const isOpen = box.hasAttribute("hidden");
+      box.toggleAttribute("hidden", !isOpen);
+      rest.toggleAttribute("hidden", isOpen);
       open.ariaExpanded = String(isOpen);
       if (isOpen) this.show();
     };

@@ -76,7 +76,7 @@ export class Queue {
       const by = one.who && one.who !== me ? say("by", called(one.who)) : "";
       put(about, one.ms === null ? by : `≈ ${minutes(one.ms)}`);
       const why = PUT_OFF[one.putOff ?? ""];
-      tag.hidden = !why;
+      tag.toggleAttribute("hidden", !why);
       put(tag, why ? say(why) : "");
       const words = [say("turn", index + 1, orders.length), `${one.product} ${one.name}`, tag.textContent, about.textContent];
       label(row, words.filter(Boolean).join(", "));
@@ -84,8 +84,9 @@ export class Queue {
       label(up, say("move_up", one.product), true);
       label(down, say("move_down", one.product), true);
       label(out, say("cancel_order", one.product), true);
-      [up.disabled, down.disabled] = [index === 0, index === orders.length - 1];
-      for (const button of [up, down, out]) button.hidden = !mayDrive;
+      up.toggleAttribute("disabled", index === 0);
+      down.toggleAttribute("disabled", index === orders.length - 1);
+      for (const button of [up, down, out]) button.toggleAttribute("hidden", !mayDrive);
     });
     this.mayDrive = mayDrive;
     // A row that changes its place loses the focus in some browsers.

@@ -114,7 +114,7 @@ export class Tiles {
   find() {
     const { value } = this.field;
     const found = matches(this.goods, value);
-    for (const [id, button] of this.buttons) button.hidden = !found.some((one) => String(one.id) === id);
+    for (const [id, button] of this.buttons) button.toggleAttribute("hidden", !found.some((one) => String(one.id) === id));
     if (!value.trim()) return;
     const [one] = found;
     put(this.said, one ? (found.length > 1 ? "" : say("search_one", titleOf(one))) : say("search_none"));

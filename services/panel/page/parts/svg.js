@@ -23,7 +23,8 @@ export function make(name, attributes = {}, parent = null, text = null) {
 }
 
 /**
- * Changes an attribute only where it is another one: what is as it was is not painted again.
+ * Changes an attribute only where it is another one: what is as it was is not styled and painted again. So does
+ * `toggleAttribute` with attributes that are there or not, and `element.hidden = true` does not.
  *
  * @param {Element} element
  * @param {string} name

@@ -4,7 +4,7 @@
 /** @import { Point } from "../map/grid.js" */
 /** @import { Product, Side, Warehouse } from "../station/robot.js" */
 
-import { LIMITS } from "../words/table.js";
+import { LIMITS } from "./limits.js";
 
 /** @typedef {[key: string, ...values: (string | number)[]]} Said The key of a sentence and its values. */
 

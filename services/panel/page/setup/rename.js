@@ -57,7 +57,7 @@ export class Rename {
     this.id = id;
     put(number, String(id));
     name.value = this.onMap.edits.now?.product?.find((product) => product.id === id)?.name ?? "";
-    form.hidden = false;
+    form.toggleAttribute("hidden", false);
     beside(form, this.map.pixels(at), this.map.size, OFF_PX);
     name.select();
   }
@@ -79,7 +79,7 @@ export class Rename {
     const { form } = this.parts;
     const hadHand = form.contains(document.activeElement);
     this.id = null;
-    form.hidden = true;
+    form.toggleAttribute("hidden", true);
     if (hadHand) this.map.svg.focus();
   }
 }

@@ -112,7 +112,7 @@ export class Rows {
     this.rows.forEach(({ line, why }, index) => {
       const said = wrong[index];
       put(why, said ? say(...said) : "");
-      why.hidden = !said;
+      why.toggleAttribute("hidden", !said);
       line.classList.toggle("bad", Boolean(said));
     });
   }

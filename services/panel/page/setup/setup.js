@@ -10,7 +10,7 @@ import { Edits, placed, wrongFloor, wrongGoods } from "./edits.js";
 import { Rows } from "./rows.js";
 import { readFile, readGoods, readMap, wrongDrawing } from "./written.js";
 import { reason } from "../words/sentences.js";
-import { LIMITS } from "../words/table.js";
+import { LIMITS } from "./limits.js";
 import { decimal, put, say } from "../words/words.js";
 
 /**
@@ -226,7 +226,7 @@ export class Setup {
     /** @type {(button: HTMLButtonElement, key: string, what: Said | null) => void} */
     const name = (button, key, what) => {
       const words = say(key, what ? say(...what) : "");
-      button.disabled = !what || !link.mayDrive;
+      button.toggleAttribute("disabled", !what || !link.mayDrive);
       if (button.title === words) return;
       button.title = words;
       button.setAttribute("aria-label", words);
@@ -237,7 +237,7 @@ export class Setup {
     const { unsaved } = edits;
     const words = unsaved === 1 ? say("unsaved_one") : unsaved ? say("unsaved_many", unsaved) : "";
     put(parts.unsaved, unsaved && this.isElsewhere ? `${words}; ${say("saved_elsewhere")}` : words);
-    parts.discard.hidden = !unsaved || !edits.safe || !link.mayDrive;
+    parts.discard.toggleAttribute("hidden", !unsaved || !edits.safe || !link.mayDrive);
     const { size: [x, y] = [0, 0], side_length_cm: side = 0 } = edits.now ?? {};
     put(parts.floor, side ? `${decimal((x * side) / 100)} × ${decimal((y * side) / 100)} m` : "");
   }

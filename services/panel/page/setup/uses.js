@@ -59,11 +59,11 @@ export class Uses {
     const here = [...link.robots.values()].filter(({ connected }) => connected);
     put(parts.robots, here.map(told).join(" "));
     const robot = this.candidate();
-    parts.ask.hidden = !robot || !link.mayDrive || this.name !== null;
+    parts.ask.toggleAttribute("hidden", !robot || !link.mayDrive || this.name !== null);
     if (robot) put(parts.ask, say("renew", robot.name));
     // What was asked about may have gone, or been put there by somebody else.
     if (robot?.name !== this.name) this.name = null;
-    parts.box.hidden = this.name === null;
+    parts.box.toggleAttribute("hidden", this.name === null);
     if (!robot || this.name === null) return;
     // The order under way need not be listed with those that wait.
     const ordered = new Set([robot.state.product, ...robot.queue.map(({ product }) => product)]);

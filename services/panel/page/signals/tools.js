@@ -49,10 +49,10 @@ export class Tools {
    * @param {number} now by the station's clock
    */
   draw({ held, ms, older }, now) {
-    this.tag.hidden = !held;
+    this.tag.toggleAttribute("hidden", !held);
     if (held) put(this.tag, say("paused", brief(Math.max(0, now - held.to))));
     put(this.pause, say(held ? "go_live" : "pause"));
     for (const window of this.windows) window.element.ariaPressed = String(window.ms === ms);
-    this.back.disabled = !older.length;
+    this.back.toggleAttribute("disabled", !older.length);
   }
 }

@@ -50,6 +50,8 @@ const HERE_MS = 1_000;
 const NO_TOKEN = "no_token";
 /** A clock that goes back by more than this was set, in ms. */
 const SET_MS = 1_000;
+/** What a robot tells again and again although nothing has happened. */
+const FIGURES = new Set(["state", "latency", "truth", "health", "sensors"]);
 const RETRY_MS = [250, 500, 1_000, 2_000];
 
 export class Link extends EventTarget {
@@ -233,13 +235,17 @@ export class Link extends EventTarget {
     const [word, first = "", ...rest] = line.split(" ");
     if (word === "from") {
       const [what = "", ...more] = rest;
-      report(this.robot(first), what, more, performance.now(), this.now());
+      const robot = this.robot(first);
+      const { turns } = robot;
+      report(robot, what, more, performance.now(), this.now());
+      if (!FIGURES.has(what) || robot.turns !== turns) this.emit("news");
     } else if (word === "past") {
       const [age, what = "", ...more] = rest;
       report(this.robot(first), what, more, performance.now(), this.now() - Number(age));
     } else if (word === "about") {
       this.about(this.robot(first), fields(rest));
     } else if (word === "answer") {
+      this.emit("news");
       this.answer(first, rest);
     } else if (word === "time") {
       this.setTime(Number(first));
@@ -280,7 +286,10 @@ export class Link extends EventTarget {
    * @param {Robot} robot
    * @param {Fields} said
    */
-  about(robot, said) {
+  about(robot, { age_ms: age, ...said }) {
+    const told = Object.values(said).join(" ");
+    if (robot.told !== told) this.emit("news");
+    robot.told = told;
     robot.connected = said.connected === "1";
     robot.speaks = said.speaks === "1";
     robot.driver = said.driver === "-" ? null : said.driver ?? null;
@@ -288,7 +297,7 @@ export class Link extends EventTarget {
     robot.uses = said.uses ?? "-";
     robot.renews = said.renews === "1";
     // One that speaks only the document's language shows nothing that could be old.
-    robot.heard = said.age_ms === undefined ? -Infinity : performance.now() - Number(said.age_ms);
+    robot.heard = age === undefined ? -Infinity : performance.now() - Number(age);
   }
 
   /**
@@ -304,7 +313,7 @@ export class Link extends EventTarget {
     else settle({ refused: rest.join(" "), isUnknown: what === "lost" });
   }
 
-  /** @param {"link" | "robots" | "warehouse" | "pose"} name */
+  /** @param {"link" | "robots" | "warehouse" | "pose" | "news"} name */
   emit(name) {
     this.dispatchEvent(new Event(name));
   }

@@ -90,6 +90,8 @@ export function report(robot, word, rest, now, at) {
 export function note(robot, word, rest, at) {
   if (word === "thinks") robot.thinks = fields(rest);
   else if (word === "because") robot.thinks = { because: rest.join(" ") };
+  // What a person has asked for in a terminal is told by the robot, behind the crossing where it was.
+  if (word === "event" && rest[0] === "asked") return note(robot, "asked", rest.slice(5), at);
   if (word !== "event" && word !== "thought" && word !== "asked") return null;
   // A thought's values come right before it.
   /** @type {Entry} */

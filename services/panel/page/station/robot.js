@@ -55,8 +55,22 @@ const MOMENTS = 1_400;
 const ENTRIES = 1_000;
 /** How fast it is at most for each unit of duty, in mm/s: 73 at a duty of 104 is usual, with room above. */
 const MM_PER_DUTY = 1;
+/**
+ * What of a state changes all the time, while the robot stands, too.
+ *
+ * @type {Set<string>}
+ */
+const FIGURES = new Set(["time_ms", "unsure_mm", "stop_age_ms", "line_bits", "line_error", "distance_cm", "loads", "battery_dv", "battery_percent", "battery_left_s"]);
 /** It is not taken to drive on for longer than this, in s. */
 const DRIVES_ON_S = 60;
+
+/**
+ * Whether a state says more than other figures than the one before.
+ *
+ * @param {Fields} state
+ * @param {Fields} before
+ */
+const turned = (state, before) => Object.keys({ ...state, ...before }).some((key) => !FIGURES.has(key) && state[key] !== before[key]);
 
 export class Robot {
   /** @param {string} name */
@@ -77,6 +91,10 @@ export class Robot {
     this.asks = null;
     /** When the station last heard it, by this page's clock. */
     this.heard = -Infinity;
+    /** What the station says about it. */
+    this.told = "";
+    /** How many of its states have said more than other figures. */
+    this.turns = 0;
     /** @type {State} */
     this.state = {};
     /** When its state last came, by this page's clock. */
@@ -196,6 +214,7 @@ export class Robot {
     pace.robot(state.time_ms === undefined ? null : Number(state.time_ms), at);
     this.stoppedSince = state.stop_age_ms === undefined ? null : at - pace.waited - Number(state.stop_age_ms);
     this.stray(state, now);
+    if (turned(state, this.state)) this.turns += 1;
     this.state = state;
     this.stated = now;
     this.remember(now - pace.waited);

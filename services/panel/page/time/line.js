@@ -161,7 +161,7 @@ export class TimeLine {
       this.asked = robot.name;
       this.kept.marks(robot).then((isKept) => (this.isKept = isKept));
     }
-    line.hidden = !robot || !this.isKept;
+    line.toggleAttribute("hidden", !robot || !this.isKept);
     document.body.classList.toggle("past", this.moment.isShown);
     this.tag();
     if (line.hidden || !this.width) return;
@@ -221,12 +221,12 @@ export class TimeLine {
   tell(at, now) {
     const { slider } = this.parts;
     const seconds = this.span / 1_000;
-    slider.ariaValueMin = "0";
-    slider.ariaValueMax = String(seconds);
-    slider.ariaValueNow = String(at === null ? seconds : Math.max(0, Math.round(seconds - (now - at) / 1_000)));
-    slider.ariaValueText = at === null ? say("time_now") : say("moment", clock(at));
-    slider.ariaDisabled = String(this.moment.isArmed());
-    this.parts.now.disabled = at === null;
+    set(slider, "aria-valuemin", 0);
+    set(slider, "aria-valuemax", seconds);
+    set(slider, "aria-valuenow", at === null ? seconds : Math.max(0, Math.round(seconds - (now - at) / 1_000)));
+    set(slider, "aria-valuetext", at === null ? say("time_now") : say("moment", clock(at)));
+    set(slider, "aria-disabled", String(this.moment.isArmed()));
+    this.parts.now.toggleAttribute("disabled", at === null);
   }
 
   /** Over the map: that it shows the past, which moment, and what the robot did then. */
@@ -234,7 +234,7 @@ export class TimeLine {
     const { tag } = this.parts;
     const { at, past, why, isShown } = this.moment;
     const [when, what] = tag.children;
-    tag.hidden = !isShown;
+    tag.toggleAttribute("hidden", !isShown);
     if (at === null || !isShown || !when || !what) return;
     put(when, say("moment_ago", clock(at), age(this.link.now() - at)));
     put(what, why ? say(why) : !past ? "" : Number.isFinite(past.stated) ? this.moment.face().said ?? "" : say("moment_none"));

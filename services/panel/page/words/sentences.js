@@ -4,11 +4,12 @@
 
 /** @import { Fields } from "../station/robot.js" */
 
-import { TABLE } from "./table.js";
-import { current, decimal, say } from "./words.js";
+import { decimal, names, open, say } from "./words.js";
 
 /** The actions that take no words, each with its button: the names of the table that begin with `do_`. */
-export const PLAIN = Object.keys(TABLE).filter((name) => name.startsWith("do_")).map((name) => name.slice("do_".length));
+export function plain() {
+  return names().filter((name) => name.startsWith("do_")).map((name) => name.slice("do_".length));
+}
 
 /**
  * The sentence of a name, with the values filled in; null if the name is not known here.
@@ -18,13 +19,13 @@ export const PLAIN = Object.keys(TABLE).filter((name) => name.startsWith("do_"))
  * @returns {string | null}
  */
 export function sentence(name, values = {}) {
-  const text = TABLE[name]?.[current()];
+  const text = open(name);
   return text?.replace(/\{(\w+)\}/g, (_, key) => String(values[key] ?? "")) ?? null;
 }
 
 /**
- * Why an answer is no: "lost" where there is no link, else a code with its values, in the order in which the English
- * sentence has them first. The last value is the rest, and may be a reason itself. Words that are no code are shown.
+ * Why an answer is no: "lost" where there is no link, else a code with its values, in the order in which the
+ * sentence has them first, in each language. The last value is the rest, and may be a reason itself. Words that are no code are shown.
  *
  * @param {string} refused
  * @returns {string}
@@ -32,9 +33,9 @@ export function sentence(name, values = {}) {
 export function reason(refused) {
   if (refused === "lost") return say("lost");
   const [code = "", ...words] = refused.split(" ");
-  const sentences = TABLE[code];
-  if (!sentences) return refused;
-  const keys = [...new Set([...sentences.en.matchAll(/\{(\w+)\}/g)].map(([, key = ""]) => key))];
+  const text = open(code);
+  if (!text) return refused;
+  const keys = [...new Set([...text.matchAll(/\{(\w+)\}/g)].map(([, key = ""]) => key))];
   const last = words.splice(keys.length - 1).join(" ");
   const values = [...words.map(decodeURIComponent), last];
   return sentence(code, Object.fromEntries(keys.map((key, at) => [key, told(key, values[at] ?? "")]))) ?? refused;
@@ -53,7 +54,15 @@ function told(key, value) {
 }
 
 /**
- * What a page is called: a name that a person chose, the one who reads this, or the number of a guest.
+ * What a person calls the parts of a robot by which people ask something of it.
+ *
+ * @type {Partial<Record<string, string>>}
+ */
+const PARTS = { comm: "by_comm", operator: "by_operator" };
+
+/**
+ * What somebody is called: a name that a person chose, the one who reads this, the number of a guest, or one of these
+ * parts.
  *
  * @param {string} name
  * @param {string | null} me
@@ -62,6 +71,8 @@ function told(key, value) {
 export function called(name, me = null) {
   if (name === me) return sentence("called_you") ?? name;
   const [, guest] = name.match(/^panel-(\d+)$/) ?? [];
+  const part = PARTS[name];
+  if (part) return say(part);
   const known = guest ? sentence("called_guest", { number: guest }) : name === "panel" ? sentence("called_form") : null;
   return known ?? name;
 }

@@ -225,3 +225,31 @@ fn whoever_connects_and_asks_nothing_is_sent_away() {
     assert!(page.line("answer 1").is_some());
     assert_eq!(status(&panel.ask_as_driver("/")), 200);
 }
+
+#[test]
+fn a_robot_that_says_only_that_it_is_there_is_told_of_ten_times_a_second() {
+    let panel = Running::new();
+    let mut stream = TcpStream::connect(panel.station).unwrap();
+    writeln!(stream, "lager 1 r1").unwrap();
+    let mut page = panel.own_page();
+    page.line("about r1 connected=1 speaks=1").unwrap();
+    let begin = Instant::now();
+    let says = std::thread::spawn(move || {
+        for number in 0..400 {
+            writeln!(stream, "lager 1 r1 {number}").unwrap();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        stream
+    });
+    let mut lines = 0;
+    while !says.is_finished() {
+        page.line("about r1 connected=1 speaks=1").unwrap();
+        lines += 1;
+    }
+    let tenths = begin.elapsed().as_millis() / 100;
+    assert!(
+        lines > 0 && lines <= tenths + 1,
+        "{lines} in {tenths} tenths of a second"
+    );
+    drop(says.join());
+}

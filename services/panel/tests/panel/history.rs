@@ -114,6 +114,25 @@ fn any_time_of_a_robot_is_a_table_whose_heads_have_units() {
     assert!(rows[2].contains(",11.3,"), "{table}");
     assert_eq!(rows.len(), 3, "the other robot is not in it: {table}");
 
+    // The table is for programs: it is the same for who reads Swedish, whose decimal mark is a comma,
+    // and a text with a comma is one cell.
+    let (host, cookie) = (panel.host(), panel.cookie());
+    let headers = [
+        ("Host", &*host),
+        ("Cookie", &*cookie),
+        ("Accept-Language", "sv-SE,sv;q=0.9"),
+    ];
+    let swedish = content(&panel.ask("/history/states.csv?robot=r1", &headers));
+    assert_eq!(swedish, table);
+    let cells = |row: &str| {
+        let outside: String = row.split('"').step_by(2).collect();
+        outside.split(',').count()
+    };
+    assert!(rows[1].contains(",\"1,0\","), "{table}");
+    for row in &rows {
+        assert_eq!(cells(row), cells(rows[0]), "{row}");
+    }
+
     // The same for one moment, and as lines for the page.
     let (since, until) = (kept.begin_ms + 1, kept.begin_ms + 2_000);
     let asked = format!("/history/states?robot=r1&since={since}&until={until}");
@@ -272,14 +291,20 @@ fn who_takes_a_long_answer_slowly_delays_nobody() {
     let another = panel.ask_as_driver("/history/events?robot=r1");
     assert_eq!(status(&another), 503);
     assert!(another.contains("try again"), "{another}");
-    // Pages and robots go on.
+    // Pages and robots go on, although eight more pages read nothing of what they are told.
     let robot = panel.robot("r1");
+    let _unread: Vec<_> = (0..8).map(|_| panel.own_page()).collect();
     let mut page = panel.own_page();
     page.line("about r1 ").unwrap();
     page.say("take r1 1");
     assert_eq!(page.line("answer 1").unwrap(), "answer 1 done");
-    page.say("stop r1 2");
-    assert_eq!(page.line("answer 2").unwrap(), "answer 2 stopped 7");
+    for number in 2..40 {
+        page.say(&format!("do r1 {number} {number}000 drive 2"));
+        let answer = page.line(&format!("answer {number}")).unwrap();
+        assert_eq!(answer, format!("answer {number} done"));
+    }
+    page.say("stop r1 40");
+    assert_eq!(page.line("answer 40").unwrap(), "answer 40 stopped 7");
     assert!(
         robot
             .0

@@ -48,7 +48,9 @@ pub(crate) struct Pi {
 }
 
 impl Pi {
-    pub(crate) fn new(warehouse: &Warehouse, options: RobotOptions) -> Self {
+    pub(crate) fn new(warehouse: &Warehouse, mut options: RobotOptions) -> Self {
+        // The robot's owner has told its board of the divider before.
+        options.steering.robot.divider = true;
         Self::around(Robot::new(warehouse, options).expect("the warehouse is valid"))
     }
 

@@ -88,6 +88,14 @@ impl Ears {
         self.voices.iter().map(|voice| voice.pid).collect()
     }
 
+    /// How many of them are at work: they have said something, or may work without that.
+    pub(crate) fn at_work(&self) -> usize {
+        let works = |voice: &&Voice| {
+            voice.was_heard || voice.service.sign() == Sign::File && voice.real >= REAL
+        };
+        self.voices.iter().filter(works).count()
+    }
+
     /// Process `pid` has said something.
     pub(crate) fn heard(&mut self, pid: u32) {
         for voice in self.voices.iter_mut().filter(|voice| voice.pid == pid) {

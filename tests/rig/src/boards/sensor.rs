@@ -2,12 +2,13 @@
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
-    BoardStatus, Callsign, Centimetres, LineBits, LineReading, LineState, Packet, Payload,
-    ResetCause, SettingKey, SettingReply, SettingStatus,
+    BoardStatus, Callsign, Centimetres, LineBits, LineReading, LineState, Packet, Payload, Profile,
+    ResetCause, SensorProfile, SettingKey, SettingReply, SettingStatus,
 };
 
 use super::Peer;
-use crate::{GAP_US, answer_to};
+use crate::GAP_US;
+use crate::board::answer_to;
 
 /// A sensor board. Every 10 ms it sends a packet, in turn the line and the distance.
 pub struct SensorBoard {
@@ -104,6 +105,9 @@ impl SensorBoard {
                 }
                 SettingStatus::Accepted
             }
+            // It plays no robot of its own, and takes whatever it is told.
+            SettingKey::Sensors => SettingStatus::Accepted,
+            key if SensorProfile::index(key).is_some() => SettingStatus::Accepted,
             _ => SettingStatus::NotHere,
         };
         self.answers.push(answer_to(&setting, status));

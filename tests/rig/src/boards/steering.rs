@@ -5,12 +5,13 @@ use core::time::Duration;
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
-    ArmData, ArmProfile, BoardStatus, Callsign, Command, Packet, Payload, ResetCause, Setting,
-    SettingKey, SettingStatus,
+    ArmData, ArmProfile, BoardStatus, Callsign, Command, Packet, Payload, Profile, ResetCause,
+    Setting, SettingKey, SettingStatus,
 };
 
 use super::{Peer, Register};
-use crate::{GAP_US, answer_to};
+use crate::GAP_US;
+use crate::board::answer_to;
 
 /// A steering board.
 pub struct SteeringBoard {

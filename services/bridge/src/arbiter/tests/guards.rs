@@ -66,22 +66,62 @@ fn a_command_that_the_board_gave_up_for_its_age_does_not_set_it_off_again() {
 #[test]
 fn an_arm_order_waits_until_the_board_obeys_its_limits() {
     let mut bench = Bench::manual();
-    bench.arbiter.set_arm_gate(ArmGate::Held);
+    bench.arbiter.set_gates(Gate::Open, Gate::Held);
     let order = drive(Origin::Operator, 1, ARM_UP);
     assert_eq!(bench.give(order), Verdict::Executes);
     bench.run_renewed(500, order);
     assert!(!bench.board.executed.contains(&ARM_UP.code()));
     assert_eq!(bench.ended(), None, "it waits");
-    bench.arbiter.set_arm_gate(ArmGate::Open);
+    bench.arbiter.set_gates(Gate::Open, Gate::Open);
     bench.run_renewed(500, order);
     assert_eq!(bench.ended(), Some((Origin::Operator, 1, Finish::Done)));
     assert_eq!(bench.board.completed, 1);
 }
 
 #[test]
+fn no_wheel_turns_until_the_boards_know_their_robot() {
+    let mut bench = Bench::manual();
+    bench.arbiter.set_gates(Gate::Held, Gate::Open);
+    let order = drive(Origin::Operator, 1, FORWARD);
+    assert_eq!(bench.give(order), Verdict::Refused(Refusal::Undescribed));
+    bench.run_renewed(200, order);
+    assert!(!bench.board.executed.contains(&FORWARD.code()));
+    bench.arbiter.set_gates(Gate::Open, Gate::Open);
+    bench.run_renewed(200, drive(Origin::Operator, 2, FORWARD));
+    assert_eq!(bench.board.code, FORWARD.code());
+    bench.arbiter.set_gates(Gate::Shut, Gate::Open);
+    bench.run_renewed(200, drive(Origin::Operator, 2, FORWARD));
+    assert_eq!(bench.board.code, STANDBY.code());
+    assert_eq!(bench.ended(), Some((Origin::Operator, 2, Finish::Aborted)));
+    let order = drive(Origin::Operator, 3, ARM_UP);
+    assert_eq!(bench.give(order), Verdict::Refused(Refusal::Undescribed));
+}
+
+#[test]
+fn a_setpoint_stands_while_a_board_is_told_and_a_turn_is_over() {
+    let mut bench = Bench::manual();
+    let order = drive(Origin::Operator, 1, FORWARD);
+    bench.run_renewed(200, order);
+    bench.arbiter.set_gates(Gate::Held, Gate::Open);
+    bench.run_renewed(60, order);
+    assert_eq!(bench.board.code, STANDBY.code());
+    bench.arbiter.set_gates(Gate::Open, Gate::Open);
+    bench.run_renewed(60, order);
+    assert_eq!(bench.board.code, FORWARD.code());
+    let turn = drive(Origin::Operator, 2, LEFT_DIAG);
+    bench.run_renewed(60, turn);
+    bench.arbiter.set_gates(Gate::Held, Gate::Open);
+    bench.run_renewed(60, turn);
+    assert_eq!(bench.ended(), Some((Origin::Operator, 2, Finish::Aborted)));
+    bench.arbiter.set_gates(Gate::Open, Gate::Open);
+    bench.run_renewed(200, turn);
+    assert_eq!(bench.board.code, STANDBY.code(), "it does not come back");
+}
+
+#[test]
 fn without_limits_the_arm_is_refused_and_the_wheels_are_not() {
     let mut bench = Bench::manual();
-    bench.arbiter.set_arm_gate(ArmGate::Shut);
+    bench.arbiter.set_gates(Gate::Open, Gate::Shut);
     let order = drive(Origin::Operator, 1, ARM_UP);
     assert_eq!(bench.give(order), Verdict::Refused(Refusal::ArmUnlimited));
     bench.run_renewed(200, order);

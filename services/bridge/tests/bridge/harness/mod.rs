@@ -389,9 +389,8 @@ impl<A: Peer, B: Peer> Robot<A, B> {
     }
 
     pub(crate) fn wait_until_up(&mut self) -> Health {
-        self.hands.wait_for_health("both boards are up", |health| {
-            health.sensor.up == 1 && health.steering.up == 1
-        })
+        self.hands
+            .wait_for_health("both boards are ready", Health::boards_are_ready)
     }
 }
 

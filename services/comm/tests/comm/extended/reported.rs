@@ -6,7 +6,6 @@ use lager_home::Watched;
 use lager_lines::Name;
 use lager_lines::extension::{Finding, Latency};
 use lager_orders::Mode;
-use lager_sample::Stamp;
 use lager_topics::{
     BlockedWay, BlockedWays, DistanceFrame, Durations, Event, EventKind, Failure, FailureKind,
     LineFrame, NavigatorStatus, Phase, Remedy, Role, Route, RouteNode, SERVO_UNKNOWN,
@@ -367,26 +366,15 @@ fn what_happens_to_the_robot_is_told_and_told_again_to_a_station_that_comes_late
         happened(&robot.mode(Mode::Manual)),
         ["event mode 0 0 - - manual"]
     );
-    let now = robot.now;
-    let stamp = |epoch, publish_time_ns| Stamp {
-        epoch,
-        publish_time_ns,
-        ..Stamp::default()
-    };
-    robot.conversation.lives(now, Role::Logic, &stamp(1, 1));
-    robot.conversation.lives(now, Role::Logic, &stamp(1, 5));
+    robot.conversation.asked(robot.now.ns, "operator gains 3 2");
     assert_eq!(
         happened(&robot.done()),
-        [""; 0],
-        "it has not been seen before"
+        ["event asked 0 0 - - operator gains 3 2"]
     );
-    // The attendant hands on what the dead one has said last, and its successor then speaks.
-    robot.conversation.lives(now, Role::Logic, &stamp(7, 5));
-    assert_eq!(happened(&robot.done()), [""; 0]);
-    robot.conversation.lives(now, Role::Logic, &stamp(8, 9));
-    // The dead one's last sample may be read after the successor's first.
-    robot.conversation.lives(now, Role::Logic, &stamp(1, 6));
-    assert_eq!(happened(&robot.done()), ["event restarted 0 0 - - logic"]);
+    let now = robot.now;
+    robot.conversation.services(now, vec![logic(Some(7), 0)]);
+    robot.conversation.services(now, vec![logic(None, 0)]);
+    assert_eq!(happened(&robot.done()), ["event ended 0 0 - - logic"]);
     robot.disconnect();
     robot.leap(2_000);
     robot.connect();
@@ -402,7 +390,8 @@ fn what_happens_to_the_robot_is_told_and_told_again_to_a_station_that_comes_late
             "event stopped 0 0 - - ordered operator",
             "event resumed 0 0 - -",
             "event mode 0 0 - - manual",
-            "event restarted 0 0 - - logic",
+            "event asked 0 0 - - operator gains 3 2",
+            "event ended 0 0 - - logic",
             "event link_lost 0 0 - -",
             "event link_back 0 0 - -",
         ]
@@ -412,8 +401,63 @@ fn what_happens_to_the_robot_is_told_and_told_again_to_a_station_that_comes_late
         .iter()
         .map(|words| words[1].parse().unwrap())
         .collect();
-    assert!(ages[..5].iter().all(|age| *age >= 2_000), "{ages:?}");
+    assert!(ages[..6].iter().all(|age| *age >= 2_000), "{ages:?}");
     assert!(ages.is_sorted_by(|before, after| before >= after));
+}
+
+/// Logic as its supervisor sees it; it was started or has ended long ago.
+fn logic(pid: Option<u32>, restarts: u32) -> Watched {
+    Watched {
+        name: "logic".to_owned(),
+        pid,
+        since_ns: 0,
+        restarts,
+    }
+}
+
+#[test]
+fn a_service_that_ends_has_one_end_and_one_return_however_often_it_dies_in_between() {
+    let mut robot = extended(Mode::Autonomous);
+    robot.leap(2_000);
+    let now = robot.now;
+    let mut look = |service: Watched| {
+        robot.conversation.services(now, vec![service]);
+        let said = robot.done().into_iter();
+        let events = said.filter(|line| line.starts_with("event "));
+        events.collect::<Vec<_>>()
+    };
+    let (ended, back) = ("event ended 0 0 - - logic", "event restarted 0 0 - - logic");
+    // How often it was started before anybody looked is no news.
+    assert_eq!(look(logic(Some(1), 4)), [""; 0]);
+    // It dies at every start.
+    assert_eq!(look(logic(None, 4)), [ended]);
+    let starts = |pid, restarts| Watched {
+        since_ns: now.ns,
+        ..logic(pid, restarts)
+    };
+    assert_eq!(look(starts(Some(2), 5)), [""; 0]);
+    assert_eq!(look(starts(None, 5)), [""; 0]);
+    assert_eq!(look(starts(Some(3), 6)), [""; 0]);
+    // It has run for a while.
+    assert_eq!(look(logic(Some(3), 6)), [back]);
+    assert_eq!(look(logic(Some(3), 6)), [""; 0]);
+    // Nobody has looked between its end and its next start.
+    assert_eq!(look(logic(Some(4), 7)), [ended, back]);
+    // One that is away when it is seen first has ended.
+    let mut other = logic(None, 0);
+    other.name = "station".to_owned();
+    assert_eq!(look(other), ["event ended 0 0 - - station"]);
+}
+
+#[test]
+fn a_comm_that_was_started_anew_tells_its_own_end_and_return() {
+    let mut robot = extended(Mode::Autonomous);
+    robot.conversation.lives_again(robot.now);
+    let told = robot.done();
+    assert_eq!(
+        told[told.len() - 2..],
+        ["event ended 0 0 - - comm", "event restarted 0 0 - - comm"]
+    );
 }
 
 #[test]
@@ -436,7 +480,7 @@ fn one_that_is_on_its_way_is_not_calibrated() {
 fn how_machine_services_and_boards_are_is_told_once_a_second() {
     let mut robot = extended(Mode::Autonomous);
     (robot.health.sensor.up, robot.health.sensor.packets) = (1, 9);
-    robot.health.sensor.version = 1;
+    (robot.health.sensor.version, robot.health.sensor.build) = (1, 7);
     robot.health.steering.reboots = 4;
     robot.told();
     let service = |name: &str, pid, restarts, since_ns| Watched {
@@ -446,14 +490,15 @@ fn how_machine_services_and_boards_are_is_told_once_a_second() {
         restarts,
     };
     let began = robot.now.ns;
+    let services = vec![
+        service("bridge", Some(7), 0, 0),
+        service("logic", None, 2, began),
+    ];
+    robot.conversation.services(robot.now, services);
     robot.conversation.machine(Machine {
         load_percent: Some(37),
         cores: Some(4),
         memory_mib: Some([3_794, 2_100]),
-        services: vec![
-            service("bridge", Some(7), 0, 0),
-            service("logic", None, 2, began),
-        ],
         found: vec![Finding {
             code: Name::new("shared_memory").expect("a name"),
             seen: 12,
@@ -472,6 +517,7 @@ fn how_machine_services_and_boards_are_is_told_once_a_second() {
         " memory_mib=3794 memory_free_mib=2100 ",
         " sensor_age_ms=",
         " sensor_version=1 ",
+        " sensor_build=7 ",
         " steering_restarts=4 ",
         " found=shared_memory:12",
     ] {

@@ -5,13 +5,21 @@
 //! says who has the port open (`/proc/PID/fd`), but only of this user's processes; root sees all.
 //! Of other users' processes only names are known. So the check reports programs that are known to
 //! open serial ports, and programs that name the port on their command line.
+//!
+//! `ModemManager` opens each new port for a moment, so whether it has one open now says nothing. It
+//! leaves a port alone whose udev property says so, which the Debian package's rules set.
 
 use std::fs::{self, Metadata};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// Programs that open serial ports by themselves.
-const MEDDLERS: [&str; 2] = ["ModemManager", "brltty"];
+const MEDDLERS: [&str; 2] = [MODEM_MANAGER, "brltty"];
+
+const MODEM_MANAGER: &str = "ModemManager";
+/// The property of a port that it leaves alone, as udev keeps it in this folder.
+const LEFT_ALONE: &str = "E:ID_MM_DEVICE_IGNORE=1";
+const UDEV: &str = "/run/udev/data";
 
 /// A process that is not the robot's and has a port open, or may.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,7 +46,8 @@ impl Other {
             false => format!("may have {} open", port.display()),
         };
         let end = match name.as_str() {
-            "ModemManager" => "`sudo systemctl stop ModemManager` ends it, and `sudo systemctl disable ModemManager` for good".to_owned(),
+            MODEM_MANAGER => "the Debian package's udev rules keep it away from boards that are plugged in after the installation, `sudo systemctl stop ModemManager` ends it, and `sudo systemctl disable ModemManager` for good".to_owned(),
+            "lager" => "end that robot with Ctrl-C where it runs, or the service with `sudo systemctl stop lager`".to_owned(),
             name if name.ends_with("getty") => {
                 format!("`sudo systemctl stop serial-getty@{port_name}` ends it")
             }
@@ -68,6 +77,7 @@ pub fn others(ports: &[&PathBuf], own: &[u32]) -> Vec<Other> {
         for port in ports {
             let is_open = is_open(&folder, port);
             let is_guilty = match is_open {
+                _ if name.trim() == MODEM_MANAGER => !is_left_alone(Path::new(UDEV), port),
                 Some(is_open) => is_open,
                 None => is_suspect(&folder, name.trim(), port),
             };
@@ -76,7 +86,7 @@ pub fn others(ports: &[&PathBuf], own: &[u32]) -> Vec<Other> {
                     pid,
                     name: name.trim().to_owned(),
                     port: (*port).clone(),
-                    is_sure: is_open.is_some(),
+                    is_sure: is_open == Some(true),
                 });
             }
         }
@@ -90,6 +100,20 @@ fn is_open(process: &Path, port: &Path) -> Option<bool> {
     let is_same = |of: &Metadata| of.file_type().is_char_device() && of.rdev() == of_port.rdev();
     let mut files = fs::read_dir(process.join("fd")).ok()?.flatten();
     Some(files.any(|file| fs::metadata(file.path()).is_ok_and(|of| is_same(&of))))
+}
+
+/// Whether udev tells `ModemManager` to leave a port alone.
+fn is_left_alone(udev: &Path, port: &Path) -> bool {
+    let Ok(of_port) = fs::metadata(port) else {
+        // There is nothing yet that it could open.
+        return true;
+    };
+    let (major, minor) = (
+        rustix::fs::major(of_port.rdev()),
+        rustix::fs::minor(of_port.rdev()),
+    );
+    let properties = fs::read_to_string(udev.join(format!("c{major}:{minor}")));
+    properties.is_ok_and(|text| text.lines().any(|line| line == LEFT_ALONE))
 }
 
 /// Whether another user's process may have the port open.
@@ -124,6 +148,24 @@ mod tests {
         // This process is the doctor itself.
         let others = others(&[&port], &[]);
         assert!(others.iter().all(|other| other.pid != std::process::id()));
+    }
+
+    #[test]
+    fn modem_manager_leaves_a_port_alone_when_udev_says_so() {
+        let udev = std::env::temp_dir().join(format!("lager-udev-{}", std::process::id()));
+        fs::create_dir_all(&udev).expect("a temporary folder");
+        // Linux gives this device these numbers on every machine.
+        let port = Path::new("/dev/null");
+        assert!(!is_left_alone(&udev, port));
+        for (properties, is_told) in [
+            ("S:serial/by-id/usb-x\nE:ID_MM_DEVICE_IGNORE=1\n", true),
+            ("E:ID_MM_DEVICE_IGNORE=0\n", false),
+            ("E:ID_VENDOR=x\n", false),
+        ] {
+            fs::write(udev.join("c1:3"), properties).expect("a file");
+            assert_eq!(is_left_alone(&udev, port), is_told, "{properties}");
+        }
+        fs::remove_dir_all(&udev).expect("its own folder");
     }
 
     #[test]

@@ -1,0 +1,141 @@
+//! Of which parts a robot is built and how they are connected. [`crate::make`] is how well the parts
+//! are made.
+//!
+//! | part | as drawn | another robot, drawn from the seed |
+//! |---|---|---|
+//! | motors | each at the driver of its side, forwards is forwards | swapped, left or right reversed |
+//! | wheels | a full turn in 12 s at a duty of 100 | 10 to 14 s |
+//! | line sensors | high over dark tape | low |
+//! | IR ranger | GP2Y0A21 | GP2Y0A41, GP2Y0A02 |
+//! | battery | a quarter of it at the steering board | the input floats |
+//!
+//! A robot of another build drives only when its boards have been told of it.
+
+use crate::noise::Noise;
+
+/// Time of a full turn of the robot as drawn, in s (W4).
+const FULL_TURN: f64 = 12.0;
+/// The shortest and the longest full turn of another robot, in s.
+const FULL_TURNS: [f64; 2] = [10.0, 14.0];
+
+/// The model of an IR ranger.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Ranger {
+    /// Sharp GP2Y0A21YK0F.
+    #[default]
+    Gp2y0a21,
+    /// Sharp GP2Y0A41SK0F.
+    Gp2y0a41,
+    /// Sharp GP2Y0A02YK.
+    Gp2y0a02,
+}
+
+/// How a robot is built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Build {
+    /// Each motor hangs at the driver of the other side.
+    pub swapped: bool,
+    /// The motors of the left and the right side turn the other way round.
+    pub reversed: [bool; 2],
+    /// How fast the wheels are beside those of the robot as drawn.
+    pub gear: f64,
+    /// The line sensors read low over dark tape.
+    pub dark_is_low: bool,
+    /// The IR ranger's model.
+    pub ranger: Ranger,
+    /// The steering board can measure the battery.
+    pub divider: bool,
+}
+
+impl Default for Build {
+    fn default() -> Self {
+        Self {
+            swapped: false,
+            reversed: [false; 2],
+            gear: 1.0,
+            dark_is_low: false,
+            ranger: Ranger::default(),
+            divider: true,
+        }
+    }
+}
+
+impl Build {
+    /// Another robot, the same for the same seed.
+    pub fn drawn(seed: u64) -> Self {
+        const STREAM: u64 = 101;
+        let mut noise = Noise::new(seed, STREAM);
+        let bits = noise.bits();
+        let bit = |index: u32| bits >> index & 1 != 0;
+        let [fast, slow] = FULL_TURNS;
+        let turn = f64::midpoint(fast, slow) + noise.spread((slow - fast) / 2.0);
+        Self {
+            swapped: bit(0),
+            reversed: [bit(1), bit(2)],
+            gear: FULL_TURN / turn,
+            dark_is_low: bit(3),
+            ranger: match bits >> 8 & 3 {
+                0 => Ranger::Gp2y0a41,
+                1 => Ranger::Gp2y0a02,
+                _ => Ranger::Gp2y0a21,
+            },
+            divider: bit(4),
+        }
+    }
+
+    /// Time of a full turn on the spot at the standard duty, in s.
+    pub fn full_turn(&self) -> f64 {
+        FULL_TURN / self.gear
+    }
+
+    /// The duties of the left and the right motor, of those at the two drivers.
+    pub(crate) fn motors(&self, [left, right]: [i16; 2]) -> [i16; 2] {
+        let [left, right] = if self.swapped {
+            [right, left]
+        } else {
+            [left, right]
+        };
+        let turned = |duty: i16, reversed| if reversed { -duty } else { duty };
+        [
+            turned(left, self.reversed[0]),
+            turned(right, self.reversed[1]),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_repeats_and_every_difference_occurs() {
+        let builds: Vec<_> = (0..100).map(Build::drawn).collect();
+        assert_eq!(builds[7], Build::drawn(7));
+        for differs in [
+            (|build| build.swapped) as fn(&Build) -> bool,
+            |build| build.reversed[0],
+            |build| build.reversed[1],
+            |build| build.dark_is_low,
+            |build| build.ranger != Ranger::Gp2y0a21,
+            |build| !build.divider,
+            |build| build.gear > 1.0,
+        ] {
+            let count = builds.iter().filter(|build| differs(build)).count();
+            assert!((30..70).contains(&count), "{count}");
+        }
+        for build in builds {
+            assert!((10.0..=14.0).contains(&build.full_turn()), "{build:?}");
+        }
+    }
+
+    #[test]
+    fn the_drivers_of_another_build_move_other_motors() {
+        let build = Build {
+            swapped: true,
+            reversed: [true, false],
+            ..Build::default()
+        };
+        assert_eq!(build.motors([100, 90]), [-90, 100]);
+        assert_eq!(Build::default().motors([100, 90]), [100, 90]);
+    }
+}

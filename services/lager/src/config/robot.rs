@@ -1,0 +1,300 @@
+//! `robot.toml`: how one robot is built, in a file of its own that goes to another machine with the
+//! robot.
+//!
+//! ```text
+//!   robot = FILE of the configuration, else of real boards robot.toml in the robot's state folder
+//!     [wheels] [line] [distance] [battery] [arm]   each section as in the configuration
+//! ```
+//!
+//! It stands apart from the configuration because that is of a machine: ports, addresses, rights.
+//! A section may stand in one of the two files. If both say something else, nobody knows which one
+//! is right, and the robot does not start.
+//!
+//! Services do not read it: they get the configuration of the `up` that started them, with the
+//! description in it.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow, bail};
+use lager_station::files;
+use lager_supervisor::state_folder::StateFolder;
+use lager_wire::{ArmProfile, IrModel, LineProfile, RangerProfile, WheelsProfile};
+use serde::{Deserialize, Serialize};
+
+use super::invalid;
+use super::{BatterySection, Body, Config};
+
+/// The sections of the file; those that it leaves out are as the configuration has them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RobotFile {
+    wheels: Option<WheelsProfile>,
+    line: Option<LineProfile>,
+    distance: Option<RangerProfile>,
+    battery: Option<BatterySection>,
+    arm: Option<ArmProfile>,
+}
+
+impl Config {
+    /// Takes over the description of the robot from its file, if there is one.
+    ///
+    /// # Errors
+    /// The file cannot be read or is not valid, or it contradicts the configuration.
+    pub fn describe(&mut self) -> Result<()> {
+        let Some(path) = self.robot_file()? else {
+            return Ok(());
+        };
+        let read = || format!("cannot read the robot's description {}", path.display());
+        let text = files::read(&path).with_context(read)?;
+        let file: RobotFile = toml::from_str(&text).map_err(|error| {
+            anyhow!(
+                "the robot's description {} is not valid: {}. `lager config --robot` prints one with every key",
+                path.display(),
+                invalid::why(&text, &error)
+            )
+        })?;
+        take(&mut self.wheels, file.wheels, "wheels", &path)?;
+        take(&mut self.line, file.line, "line", &path)?;
+        take(&mut self.distance, file.distance, "distance", &path)?;
+        take(&mut self.battery, file.battery, "battery", &path)?;
+        take(&mut self.arm, file.arm, "arm", &path)?;
+        self.validate()
+            .with_context(|| format!("the robot's description {}", path.display()))
+    }
+
+    /// The file that describes this robot, if there is one.
+    ///
+    /// # Errors
+    /// Nothing says where the state folder is.
+    pub fn robot_file(&self) -> Result<Option<PathBuf>> {
+        if let Some(named) = &self.robot {
+            return Ok(Some(named.clone()));
+        }
+        // A simulated robot is not the real one of this name.
+        if self.body != Body::Serial {
+            return Ok(None);
+        }
+        let kept = StateFolder::of_robot(&self.state_root()?, &self.name).robot();
+        Ok(kept.exists().then_some(kept))
+    }
+
+    /// The description alone, as a file for another machine.
+    pub fn described(&self) -> String {
+        let sections = ["wheels", "line", "distance", "battery", "arm"];
+        let documented = self.documented();
+        let mut text = String::new();
+        for block in documented.split("\n\n") {
+            let head = block.lines().find_map(|line| line.strip_prefix('['));
+            let name = head.and_then(|head| head.split([']', '.']).next());
+            if name.is_some_and(|name| sections.contains(&name)) {
+                // Writing to a String cannot fail.
+                let _ = writeln!(text, "{}\n", block.trim());
+            }
+        }
+        text
+    }
+
+    /// How this robot differs from the simulated one, in a few words.
+    pub fn built(&self) -> String {
+        let usual = WheelsProfile::default();
+        let (wheels, ranger) = (&self.wheels, &self.distance);
+        let model = match ranger.model {
+            IrModel::Own => Some("an IR ranger with a curve of its own".to_owned()),
+            model if model == RangerProfile::default().model => None,
+            model => Some(format!("IR ranger {}", format!("{model:?}").to_uppercase())),
+        };
+        let when = |holds: bool, words: &str| holds.then(|| words.to_owned());
+        let duty = format!("duty {}", wheels.duty);
+        let turn = format!("a full turn in {} ms", wheels.full_turn_ms);
+        let differs = [
+            when(wheels.swapped, "motors swapped"),
+            when(wheels.left_reversed, "left motor reversed"),
+            when(wheels.right_reversed, "right motor reversed"),
+            when(wheels.duty != usual.duty, &duty),
+            when(wheels.full_turn_ms != usual.full_turn_ms, &turn),
+            when(
+                !self.line.dark_is_high,
+                "line sensors that read low over tape",
+            ),
+            model,
+            when(!self.robot().steering.divider, "no battery divider"),
+            when(self.arm != ArmProfile::default(), "an arm of its own"),
+        ];
+        let differs: Vec<_> = differs.into_iter().flatten().collect();
+        match differs.is_empty() {
+            true => "as the simulated robot".to_owned(),
+            false => differs.join(", "),
+        }
+    }
+}
+
+/// Takes a section over, unless the configuration says something else.
+fn take<T: Clone + Default + PartialEq>(
+    here: &mut T,
+    there: Option<T>,
+    name: &str,
+    path: &Path,
+) -> Result<()> {
+    let Some(there) = there else {
+        return Ok(());
+    };
+    if *here != T::default() && *here != there {
+        bail!(
+            "[{name}] stands in the configuration and, with other values, in the robot's description {}; take it out of one of them",
+            path.display()
+        );
+    }
+    *here = there;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder that goes with its owner.
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let name = format!("lager-robot-{name}-{}", std::process::id());
+            let folder = std::env::temp_dir().join(name);
+            std::fs::create_dir_all(&folder).expect("a folder");
+            Self(folder)
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    /// A configuration whose description is this text.
+    fn described(text: &str, config: Config) -> Result<Config> {
+        let of_test = std::thread::current().name().map(str::to_owned);
+        let of_test = of_test.unwrap_or_default().replace(':', "-");
+        let folder = Folder::new(&of_test);
+        let path = folder.0.join("robot.toml");
+        std::fs::write(&path, text).expect("a file");
+        let mut config = Config {
+            robot: Some(path),
+            ..config
+        };
+        config.describe().map(|()| config)
+    }
+
+    fn refused(text: &str) -> String {
+        let error = described(text, Config::default()).expect_err("it is wrong");
+        format!("{error:#}")
+    }
+
+    fn other() -> Config {
+        Config {
+            wheels: WheelsProfile {
+                swapped: true,
+                left_reversed: true,
+                full_turn_ms: 9_000,
+                ..WheelsProfile::default()
+            },
+            line: LineProfile {
+                dark_is_high: false,
+            },
+            distance: RangerProfile {
+                model: IrModel::Gp2y0a41,
+                ..RangerProfile::default()
+            },
+            battery: BatterySection {
+                divider: Some(false),
+            },
+            arm: ArmProfile {
+                squeeze_load: 250,
+                ..ArmProfile::default()
+            },
+            ..Config::default()
+        }
+    }
+
+    #[test]
+    fn what_one_machine_prints_another_reads() {
+        let text = other().described();
+        let there = described(&text, Config::default()).expect("valid");
+        assert_eq!(there.robot(), other().robot(), "{text}");
+        let same = described(&text, other()).expect("both say the same");
+        assert_eq!(same.robot(), other().robot());
+        for strange in ["[serial]", "name =", "[logic]", "secret"] {
+            assert!(!text.contains(strange), "{text}");
+        }
+        assert_eq!(
+            there.built(),
+            "motors swapped, left motor reversed, a full turn in 9000 ms, line sensors that read \
+             low over tape, IR ranger GP2Y0A41, no battery divider, an arm of its own"
+        );
+        assert_eq!(Config::default().built(), "as the simulated robot");
+    }
+
+    #[test]
+    fn a_wrong_description_is_refused_with_its_file_and_what_to_do() {
+        for (text, words) in [
+            ("[wheels]\nswaped = true\n", "did you mean `swapped`?"),
+            ("[wheels]\nduty = 9\n", "[wheels] duty is 9"),
+            ("[line]\ndark_is_high = 1\n", "true or false"),
+            ("[distance]\nmodel = \"gp2y0a12\"\n", "gp2y0a21"),
+            ("[serial]\nbaud = 9600\n", "unknown field `serial`"),
+            ("wheels", "line 1"),
+        ] {
+            let said = refused(text);
+            assert!(
+                said.contains(words) && said.contains("robot.toml"),
+                "{said}"
+            );
+        }
+        let mut nowhere = Config {
+            robot: Some("/nowhere/robot.toml".into()),
+            ..Config::default()
+        };
+        let said = format!("{:#}", nowhere.describe().expect_err("no file"));
+        assert!(said.contains("/nowhere/robot.toml"), "{said}");
+    }
+
+    #[test]
+    fn two_files_that_say_something_else_are_refused() {
+        let config = Config {
+            wheels: WheelsProfile {
+                swapped: true,
+                ..WheelsProfile::default()
+            },
+            ..Config::default()
+        };
+        let error = described("[wheels]\nswapped = false\n", config).expect_err("two");
+        let said = format!("{error:#}");
+        assert!(
+            said.contains("[wheels] stands in the configuration"),
+            "{said}"
+        );
+        assert!(said.contains("take it out of one"), "{said}");
+    }
+
+    #[test]
+    fn only_real_boards_have_the_description_of_the_state_folder() {
+        let folder = Folder::new("state");
+        let mut config = Config {
+            state: Some(folder.0.clone()),
+            body: Body::Serial,
+            ..Config::default()
+        };
+        config.describe().expect("there is none");
+        std::fs::create_dir(folder.0.join("r1")).expect("a folder");
+        let file = folder.0.join("r1/robot.toml");
+        std::fs::write(&file, "[wheels]\nswapped = true\n").expect("a file");
+        assert_eq!(config.robot_file().expect("a folder"), Some(file));
+        let mut simulated = Config {
+            body: Body::Sim,
+            ..config.clone()
+        };
+        config.describe().expect("valid");
+        simulated.describe().expect("not read");
+        assert!(config.wheels.swapped && !simulated.wheels.swapped);
+    }
+}

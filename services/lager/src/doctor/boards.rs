@@ -1,0 +1,271 @@
+//! Asks the boards themselves when no robot is up: which program they run, what their sensors read,
+//! and what they cannot hear.
+//!
+//! It opens the ports as the bridge does and takes the robot's name meanwhile, so no robot starts
+//! beside it. It gives no command, so nothing moves. It only asks the sensor board for its raw
+//! readings, and a board forgets that at its next start.
+
+use std::path::Path;
+use std::time::Duration;
+
+use lager_bridge::serial::OpenPortError;
+use lager_loader::{Found, Runs, UpdateError};
+use lager_topics::Misfit;
+use lager_wake::Shutdown;
+use lager_wire::{
+    ArmData, BoardStatus, Callsign, Centimetres, LineBits, Payload, ResetCause, Setting,
+    SettingKey, SteerData, SteerFlags, Version,
+};
+
+use super::{Bad, Check, Finding, Good, Hint};
+use crate::board::{self, BoardLine};
+use crate::config::{Body, Config};
+use crate::exit::InUse;
+
+/// How long it listens to a board. Each sends its counters twice a second.
+const LISTENS: Duration = Duration::from_millis(2_500);
+
+/// How long it waits for a board that was just switched on, and waits in its bootloader for a moment.
+const STARTS: Duration = Duration::from_secs(5);
+
+/// What a board has said.
+#[derive(Debug, Default)]
+struct Heard {
+    bits: Option<LineBits>,
+    distance: Option<Centimetres>,
+    steer: Option<SteerData>,
+    /// The servos that have answered, one bit each.
+    servos: u8,
+    /// The first and the last of its counters.
+    status: Option<(BoardStatus, BoardStatus)>,
+}
+
+/// The findings about both boards of a real robot.
+pub fn findings(config: &Config) -> Vec<Check> {
+    if config.body != Body::Serial {
+        return Vec::new();
+    }
+    let _robot = match board::take_robot(config) {
+        Ok(robot) => robot,
+        Err(error) if error.is::<InUse>() => {
+            return vec![(
+                "boards",
+                Good("the robot is up and has them; `lager top` shows how they are".into()),
+            )];
+        }
+        Err(error) => return vec![("boards", Hint(format!("cannot be asked: {error:#}")))],
+    };
+    let ports = [&config.serial.sensor, &config.serial.steering];
+    let mut seen = Vec::new();
+    let mut checks = Vec::new();
+    // Another check says what is wrong with a port that does not exist.
+    for port in ports.into_iter().filter(|port| port.exists()) {
+        match ask(config, port) {
+            Ok((found, _)) if seen.contains(&found.role) => checks.push((
+                check(found.role),
+                Bad(format!(
+                    "the board at {} is a {} board, too; give each board the image of its own with `lager board flash`",
+                    port.display(),
+                    found.role
+                )),
+            )),
+            Ok((found, heard)) => {
+                seen.push(found.role);
+                checks.push((check(found.role), judged(&found, &heard, port)));
+            }
+            Err(error) => {
+                let said = format!("{}: {error:#}", port.display());
+                // A robot of another user may have it.
+                let is_busy = matches!(error.downcast_ref(), Some(OpenPortError::Busy { .. }));
+                checks.push(("boards", if is_busy { Hint(said) } else { Bad(said) }));
+            }
+        }
+    }
+    checks
+}
+
+/// The subject of a board's finding.
+fn check(board: Callsign) -> &'static str {
+    match board {
+        Callsign::Steering => "steering board",
+        _ => "sensor board",
+    }
+}
+
+fn ask(config: &Config, port: &Path) -> anyhow::Result<(Found, Heard)> {
+    // Whoever ends the doctor ends this process.
+    let mut line = board::open(config, port, None, &Shutdown::new())?;
+    let mut found = lager_loader::find(&mut line)?;
+    if let Runs::Loader(Some(_)) = found.runs
+        && let Some(up) = lager_loader::ask(&mut line, STARTS)?
+    {
+        found.runs = Runs::Application(up);
+    }
+    let heard = match found.runs {
+        Runs::Application(up) if up.version == Version::One => listen(&mut line, found.role)?,
+        Runs::Application(_) | Runs::Loader(_) => Heard::default(),
+    };
+    Ok((found, heard))
+}
+
+fn listen(line: &mut BoardLine, role: Callsign) -> Result<Heard, UpdateError> {
+    let raw_line = |value| {
+        let setting = Setting {
+            key: SettingKey::RawLine,
+            seq: 0,
+            value,
+        };
+        (role == Callsign::Sensor).then_some(Payload::Setting(setting))
+    };
+    let mut heard = Heard::default();
+    lager_loader::listen(line, LISTENS, raw_line(1), |payload| heard.take(payload))?;
+    // The bridge asks for them by itself, if somebody wants them.
+    lager_loader::listen(line, LISTENS / 10, raw_line(0), |payload| {
+        heard.take(payload);
+    })?;
+    Ok(heard)
+}
+
+impl Heard {
+    fn take(&mut self, payload: Payload) {
+        match payload {
+            Payload::RawLine(bits) => self.bits = Some(bits),
+            Payload::Distance(distance) => self.distance = Some(distance),
+            Payload::SteerData(data) => self.steer = Some(data),
+            Payload::ArmData(data) => self.servos |= 1 << (data.servo - 1),
+            Payload::BoardStatus(status) => {
+                let first = self.status.map_or(status, |(first, _)| first);
+                self.status = Some((first, status));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What a board's words mean.
+fn judged(found: &Found, heard: &Heard, port: &Path) -> Finding {
+    let (who, port) = (found.role, port.display());
+    let up = match found.runs {
+        Runs::Loader(None) => {
+            return Bad(format!(
+                "it waits in its bootloader without a whole image; `lager board update` gives it one (it is at {port})"
+            ));
+        }
+        Runs::Loader(Some(build)) => {
+            return Hint(format!(
+                "it waits in its bootloader with build {build}; `lager board reset {who}` starts that (it is at {port})"
+            ));
+        }
+        Runs::Application(up) if up.version == Version::Original => {
+            return Good(format!(
+                "an original board is at {port}, which tells no more"
+            ));
+        }
+        Runs::Application(up) => up,
+    };
+    let is = format!("build {} at {port}", up.build);
+    let mut faults = Vec::new();
+    if let Some(misfit) = Misfit::of(up.version as u8, up.build) {
+        faults.push(misfit.to_string());
+    }
+    if let Some(why) = restarted(up.reset) {
+        faults.push(why);
+    }
+    let Some((first, last)) = heard.status else {
+        faults.push(format!(
+            "it answers, but sends nothing; `lager board reset {who}` restarts it"
+        ));
+        return Bad(format!("{is}; {}", faults.join("; ")));
+    };
+    let told = match found.role {
+        Callsign::Steering => steering(heard, (first, last), &mut faults),
+        _ => sensor(heard, &mut faults),
+    };
+    match faults.is_empty() {
+        true => Good(format!("{is}; {told}")),
+        false => Hint(format!("{is}; {}; {told}", faults.join("; "))),
+    }
+}
+
+/// Why a board has started, if that is a fault.
+fn restarted(why: ResetCause) -> Option<String> {
+    let advice = match why {
+        ResetCause::BrownOut => "its supply fell too low; look at battery and plugs",
+        ResetCause::Watchdog | ResetCause::Panic => {
+            "its program had stopped; save this for whoever keeps the robot"
+        }
+        _ => return None,
+    };
+    Some(format!("it has restarted by itself ({why:?}): {advice}"))
+}
+
+fn sensor(heard: &Heard, faults: &mut Vec<String>) -> String {
+    let Some(bits) = heard.bits else {
+        faults.push(
+            "no reading of the line sensors came; `lager board reset sensor` restarts it".into(),
+        );
+        return "the line is not known".into();
+    };
+    let line: String = (0..LineBits::SENSORS)
+        .map(|index| if bits.sensor(index) { '#' } else { '.' })
+        .collect();
+    if line.bytes().all(|byte| byte == b'#') {
+        faults.push(
+            "all line sensors see tape; put the robot on its floor, and calibrate them with `lager calibrate` if it stays so".into(),
+        );
+    }
+    let distance = heard
+        .distance
+        .map_or("not known".into(), |distance| format!("{} cm", distance.0));
+    format!("tape under {line} (left to right), distance {distance}")
+}
+
+fn steering(
+    heard: &Heard,
+    (first, last): (BoardStatus, BoardStatus),
+    faults: &mut Vec<String>,
+) -> String {
+    let Some(data) = heard.steer else {
+        faults.push("no report came; `lager board reset steering` restarts it".into());
+        return "its state is not known".into();
+    };
+    if !data.flags.contains(SteerFlags::EXDE_OK) {
+        faults.push(
+            "it hears nothing from the sensor board; look at the three wires between the boards, and whether the sensor board is on".into(),
+        );
+    } else if last.exde_errors != first.exde_errors {
+        faults.push(
+            "it refuses words of the sensor board again and again; look at the three wires between the boards".into(),
+        );
+    }
+    let silent: Vec<String> = (0..ArmData::SERVOS)
+        .filter(|servo| heard.servos >> servo & 1 == 0)
+        .map(|servo| (servo + 1).to_string())
+        .collect();
+    let troubled: Vec<String> = (0..ArmData::SERVOS)
+        .filter(|servo| heard.servos & data.servo_errors & 1 << servo != 0)
+        .map(|servo| (servo + 1).to_string())
+        .collect();
+    if !silent.is_empty() {
+        faults.push(format!(
+            "servos {} do not answer; look at their supply, their plugs and their ids",
+            silent.join(", ")
+        ));
+    }
+    if !troubled.is_empty() {
+        faults.push(format!(
+            "servos {} report an error; switch the arm off and on, and let it cool down",
+            troubled.join(", ")
+        ));
+    }
+    let battery = match data.battery_decivolts {
+        0 => "the battery is not measured".to_owned(),
+        decivolts => format!("battery {:.1} V", f64::from(decivolts) / 10.0),
+    };
+    format!(
+        "{battery}, {} of {} servos answer, ExDe errors {}",
+        heard.servos.count_ones(),
+        ArmData::SERVOS,
+        last.exde_errors
+    )
+}
