@@ -84,7 +84,7 @@ pub(crate) fn a_board_is_restarted_while_the_robot_stands_and_not_on_its_way(
     page.wait_for("#stop-said", "both wheels stand");
     page.click_until(
         &button("steering"),
-        &row_says("lost-steering", "restarted 1"),
+        &row_says("lost-steering", "restarts 1"),
     );
     assert!(!page.value(&refused).as_bool().expect("yes or no"));
     wait_for("only that board to have restarted", || {

@@ -88,9 +88,16 @@ static WORDS: LazyLock<[String; 2]> = LazyLock::new(|| {
             } else {
                 sentence.english
             };
+            // A name needs quotation marks only where it has a hyphen.
+            let quotes = if sentence.name.contains('-') {
+                "\""
+            } else {
+                ""
+            };
+            let name = [quotes, sentence.name, quotes].concat();
             (
                 sentence.name,
-                format!("{}: {},", sentence.name, serde_json::json!(said)),
+                format!("{name}: {},", serde_json::json!(said)),
             )
         });
         // Names beside their like pack better.
