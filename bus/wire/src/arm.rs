@@ -15,18 +15,23 @@
 //! The type stands here because configuration, bridge, board and simulator must agree on it. Its
 //! default is the robot of the simulator's world, and the profile of a board that has got none.
 
+mod kept;
 mod rules;
+mod servos;
 
 use crate::profile::{Profile, profile};
 use crate::setting::SettingKey;
 
+pub use kept::ArmValues;
 pub use rules::ArmProfileError;
 use rules::broken;
+pub use servos::{JointServos, LAST_SERVO_ID, NO_SERVO, OneOrTwo, REVERSED, ReversedJoints};
 
 /// The greatest position, load and torque of a servo.
 pub const SERVO_MAX: u16 = 1023;
 
-/// The positions to which a joint may go: 0 to 1023 of its (first) servo.
+/// The positions to which a joint may go: 0 to 1023 of its (first) servo, counted as on the robot as
+/// drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(from = "[u16; 2]", into = "[u16; 2]"))]
@@ -62,17 +67,17 @@ impl From<ArmLimits> for [u16; 2] {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct JointLimits {
-    /// Servo 1.
+    /// Grows to the left.
     pub base: ArmLimits,
-    /// Servo 2; servo 3 is mirrored.
+    /// Grows upwards; a second servo is mirrored.
     pub shoulder: ArmLimits,
-    /// Servo 4; servo 5 is mirrored.
+    /// Grows outwards; a second servo is mirrored.
     pub elbow: ArmLimits,
-    /// Servo 6.
+    /// Grows when the gripper tilts up.
     pub wrist: ArmLimits,
-    /// Servo 7.
+    /// Grows counter-clockwise.
     pub rotation: ArmLimits,
-    /// Servo 8.
+    /// Grows when it opens.
     pub gripper: ArmLimits,
 }
 
@@ -89,18 +94,18 @@ impl Default for JointLimits {
     }
 }
 
-/// A pose of the joints that carry the gripper; positions 0 to 1023 of servos 1, 2, 4 and 6.
+/// A pose of the joints that carry the gripper; positions 0 to 1023, as [`JointLimits`] counts them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ArmPose {
-    /// Servo 1.
+    /// Of the base.
     pub base: u16,
-    /// Servo 2; servo 3 is mirrored.
+    /// Of the shoulder.
     pub shoulder: u16,
-    /// Servo 4; servo 5 is mirrored.
+    /// Of the elbow.
     pub elbow: u16,
-    /// Servo 6.
+    /// Of the wrist.
     pub wrist: u16,
 }
 
@@ -115,8 +120,8 @@ impl ArmPose {
 
 profile! {
     /// What the arm may do; the steering board is told at every start, and the arm stands until
-    /// the board has taken it. Positions are those of the servos, 0 to 1023, 0.29 degrees each;
-    /// torque and load are 1 to 1023 of full.
+    /// the board has taken it. Positions are those of the servos, 0 to 1023, 0.29 degrees each, of a
+    /// reversed joint 1023 minus that; torque and load are 1 to 1023 of full.
     pub struct ArmProfile {
         /// Torque limit of all servos ...
         pub torque_limit: u16 = SERVO_MAX,
@@ -126,9 +131,15 @@ profile! {
         pub gripper_open: u16 = 512,
         /// ... and when closed on nothing.
         pub gripper_closed: u16 = 210,
+        /// The ids of the servos, 0 to 253. One or two move the shoulder and the elbow, as in
+        /// shoulder = 2 or shoulder = [2, 3]; the second one faces the first.
+        pub servos: JointServos = JointServos::default(),
+        /// Whether the servos of a joint count the other way: a position grows to the left (base),
+        /// upwards (shoulder, wrist), outwards (elbow), counter-clockwise (rotation), and when the
+        /// gripper opens.
+        pub reversed: ReversedJoints = ReversedJoints::default(),
         /// Where each joint may be sent, [lowest, highest]. A step that would lead outside is
-        /// refused. Of the shoulder and the elbow the first servo counts (2 and 4); the other one
-        /// faces it.
+        /// refused. Of the shoulder and the elbow the first servo counts.
         pub limits: JointLimits = JointLimits::default(),
         /// Where the arm goes when it has let go of goods, ...
         pub neutral: ArmPose = ArmPose::RAISED,
@@ -145,7 +156,7 @@ profile! {
 
 impl ArmProfile {
     /// How many values a board receives: all but the carry pose.
-    pub const VALUES: usize = 24;
+    pub const VALUES: usize = 32;
 
     /// Checks that an arm can obey this profile.
     ///
@@ -169,6 +180,7 @@ impl ArmProfile {
     /// The values that a board receives, in the order of [`Profile::key`].
     pub const fn values(&self) -> [u16; Self::VALUES] {
         let limits = &self.limits;
+        let servos = self.servo_values();
         [
             self.torque_limit,
             self.squeeze_load,
@@ -194,17 +206,28 @@ impl ArmProfile {
             self.drop.shoulder,
             self.drop.elbow,
             self.drop.wrist,
+            servos[0],
+            servos[1],
+            servos[2],
+            servos[3],
+            servos[4],
+            servos[5],
+            servos[6],
+            servos[7],
         ]
     }
 
     /// The profile with these values. A board has no carry pose; this takes the neutral one.
     pub const fn from_values(values: &[u16; Self::VALUES]) -> Self {
         let neutral = pose(values, 16);
+        let (servos, reversed) = servos::from_values(values, 24);
         Self {
             torque_limit: values[0],
             squeeze_load: values[1],
             gripper_open: values[2],
             gripper_closed: values[3],
+            servos,
+            reversed,
             limits: JointLimits {
                 base: limits(values, 4),
                 shoulder: limits(values, 6),
@@ -234,7 +257,7 @@ impl Profile for ArmProfile {
     }
 }
 
-const LAST: u8 = SettingKey::ArmDropWrist.code();
+const LAST: u8 = SettingKey::ArmServo8.code();
 const _: () = assert!((LAST - ArmProfile::FIRST.code() + 1) as usize == ArmProfile::VALUES);
 
 const fn limits(values: &[u16; ArmProfile::VALUES], at: usize) -> ArmLimits {

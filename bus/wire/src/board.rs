@@ -8,7 +8,8 @@
 use crate::bytes::{Bytes, Fault};
 use crate::handshake::ResetCause;
 
-/// The index, which is its id - 1, of the servo that moves each joint, the first one of a pair.
+/// The index, which is its number - 1, of the servo that moves each joint, the first one of a pair.
+/// The ids on the servos' wire are those of [`crate::ArmProfile::servos`].
 pub mod servo {
     /// Turns the arm on the robot.
     pub const BASE: usize = 0;
@@ -27,13 +28,15 @@ pub mod servo {
 /// One servo of the arm, as it last answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ArmData {
-    /// The AX-12's id, 1 to 8. The receiver refuses other ids.
+    /// The servo's number, 1 to 8, whatever its id is. The receiver refuses other numbers.
     pub servo: u8,
     /// The AX-12's error bits; bit 7 is not one of them and is dropped.
     pub errors: u8,
-    /// Position, 0 to 1023, 0.29 degrees each. Encoding saturates it.
+    /// Position, 0 to 1023, 0.29 degrees each; of a reversed joint turned round. Encoding saturates
+    /// it.
     pub position: u16,
-    /// Load, -1023 to 1023 of full torque, positive counter-clockwise. Encoding saturates it.
+    /// Load, -1023 to 1023 of full torque, positive counter-clockwise; of a reversed joint turned
+    /// round. Encoding saturates it.
     pub load: i16,
     /// Supply voltage in 0.1 V.
     pub decivolts: u8,

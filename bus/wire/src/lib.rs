@@ -34,7 +34,10 @@ mod setting;
 mod steer;
 mod text;
 
-pub use arm::{ArmLimits, ArmPose, ArmProfile, ArmProfileError, JointLimits, SERVO_MAX};
+pub use arm::{
+    ArmLimits, ArmPose, ArmProfile, ArmProfileError, ArmValues, JointLimits, JointServos,
+    LAST_SERVO_ID, NO_SERVO, OneOrTwo, REVERSED, ReversedJoints, SERVO_MAX,
+};
 pub use board::{ArmData, BoardStatus, servo};
 pub use bytes::PAYLOAD_LENGTH;
 pub use command::{ArmCommand, Command, Speed, WheelCommand};

@@ -72,6 +72,22 @@ coded! {
         ArmDropElbow = 38,
         /// Position of the wrist in the drop pose.
         ArmDropWrist = 39,
+        /// Id of the servo of the base, + 256 if it counts the other way.
+        ArmServo1 = 40,
+        /// The same of the shoulder, the first of a pair.
+        ArmServo2 = 41,
+        /// The same of the shoulder, the second of a pair, or 512.
+        ArmServo3 = 42,
+        /// The same of the elbow, the first of a pair.
+        ArmServo4 = 43,
+        /// The same of the elbow, the second of a pair, or 512.
+        ArmServo5 = 44,
+        /// The same of the wrist.
+        ArmServo6 = 45,
+        /// The same of the rotation.
+        ArmServo7 = 46,
+        /// The same of the gripper.
+        ArmServo8 = 47,
         /// Puts the description of the wheels that was sent before in force.
         Steering = 48,
         /// 1: each motor hangs at the driver of the other side.

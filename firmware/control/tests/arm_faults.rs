@@ -22,7 +22,7 @@ const DROP: u8 = 0xFB;
 fn a_missing_servo_is_flagged_and_the_others_work() {
     for missing in 1..=8_usize {
         let mut servos = Servos::at([512; 8]);
-        servos.id(missing).present = false;
+        servos.id(missing as u8).present = false;
         let mut bench = Bench::ready_with(SteeringConfig::default(), servos);
         assert_eq!(
             bench.report().servo_errors,

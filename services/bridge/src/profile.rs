@@ -10,7 +10,7 @@
 //! ```
 //!
 //! One value is on its way to a board at a time: a board's queue holds five packets, and at 9600 Bd a
-//! command to the wheels must not wait for twenty-five. So the steering board hears of its wheels
+//! command to the wheels must not wait for thirty-three. So the steering board hears of its wheels
 //! first, and of the arm when it has answered.
 //!
 //! Until the boards have accepted how motors and sensors are built, the arbiter keeps the wheels
@@ -42,7 +42,7 @@ use crate::settings::{RETRY, TRIES};
 const PAUSE: Duration = Duration::from_secs(5);
 
 /// More than the longest profile has values.
-const MOST: usize = 32;
+const MOST: usize = 40;
 
 /// How far each part has got.
 pub type States = [(Part, ProfileState); 3];

@@ -5,6 +5,7 @@
 
 use core::fmt;
 
+use super::servos::{LAST_SERVO_ID, NO_SERVO, PLACES, REVERSED};
 use super::{ArmLimits, ArmProfile, SERVO_MAX, limits};
 
 /// Why a profile is refused.
@@ -47,6 +48,20 @@ pub enum ArmProfileError {
         /// `gripper_open` and `gripper_closed`.
         position: u16,
     },
+    /// An id that no servo has.
+    Id {
+        /// The joint.
+        joint: &'static str,
+        /// The id.
+        id: u16,
+    },
+    /// Two servos with the same id.
+    SameId {
+        /// Their joints.
+        joints: [&'static str; 2],
+        /// The id.
+        id: u16,
+    },
 }
 
 impl fmt::Display for ArmProfileError {
@@ -82,6 +97,17 @@ impl fmt::Display for ArmProfileError {
                 formatter,
                 "[arm] gripper_open and gripper_closed are both {position}; the gripper needs a way to close"
             ),
+            Self::Id { joint, id } => write!(
+                formatter,
+                "[arm.servos] {joint} has id {id}; a servo's id is from 0 to {LAST_SERVO_ID} (all servos listen to 254): `lager doctor` says which ones answer"
+            ),
+            Self::SameId {
+                joints: [one, other],
+                id,
+            } => write!(
+                formatter,
+                "[arm.servos] {one} and {other} have the same id {id}; two servos with one id answer at the same time, so give each an id of its own"
+            ),
         }
     }
 }
@@ -101,6 +127,10 @@ pub(super) enum Rule {
     Outside(u8, u8),
     /// The open and the closed gripper have the same position.
     NoGrip,
+    /// The value at this place is no servo.
+    Id(u8),
+    /// The servos at these places have the same id.
+    SameId(u8, u8),
 }
 
 const TORQUE: u8 = 0;
@@ -111,10 +141,32 @@ const FIRST_LIMITS: u8 = 4;
 const GRIPPER_LIMITS: u8 = 14;
 const NEUTRAL: u8 = 16;
 const DROP: u8 = 20;
+const SERVOS: u8 = 24;
 /// The number of joints in a pose. Their limits come first and in the same order.
 const POSE: u8 = 4;
 
+/// The second servo of the shoulder and of the elbow: it may be absent, and turns as the first one.
+const SECOND: [u8; 2] = [SERVOS + 2, SERVOS + 4];
+
 const JOINTS: [&str; 6] = ["base", "shoulder", "elbow", "wrist", "rotation", "gripper"];
+
+/// The joint of the servo with this index, as an index of [`JOINTS`].
+pub(super) const fn joint_of(servo: usize) -> usize {
+    match servo {
+        0 => 0,
+        1 | 2 => 1,
+        3 | 4 => 2,
+        after => after - 2,
+    }
+}
+
+impl ArmProfile {
+    /// The name of the joint that the servo with this index moves.
+    #[must_use]
+    pub fn joint_name(servo: usize) -> &'static str {
+        JOINTS[joint_of(servo)]
+    }
+}
 
 /// The first rule that values break.
 pub(super) fn broken(values: &[u16; ArmProfile::VALUES]) -> Option<Rule> {
@@ -149,7 +201,29 @@ pub(super) fn broken(values: &[u16; ArmProfile::VALUES]) -> Option<Rule> {
             return Some(Rule::Outside(place, GRIPPER_LIMITS));
         }
     }
-    (at(OPEN) == at(CLOSED)).then_some(Rule::NoGrip)
+    if at(OPEN) == at(CLOSED) {
+        return Some(Rule::NoGrip);
+    }
+    for place in SERVOS..SERVOS + PLACES as u8 {
+        let servo = at(place);
+        if SECOND.contains(&place) {
+            if servo == NO_SERVO {
+                continue;
+            }
+            if (servo ^ at(place - 1)) & REVERSED != 0 {
+                return Some(Rule::Id(place));
+            }
+        }
+        if servo & !REVERSED > LAST_SERVO_ID {
+            return Some(Rule::Id(place));
+        }
+        for before in SERVOS..place {
+            if at(before) != NO_SERVO && (servo ^ at(before)) & !REVERSED == 0 {
+                return Some(Rule::SameId(before, place));
+            }
+        }
+    }
+    None
 }
 
 impl Rule {
@@ -162,6 +236,8 @@ impl Rule {
         let at = |place: u8| values[usize::from(place)];
         let joint = |limits: u8| JOINTS[usize::from((limits - FIRST_LIMITS) / 2)];
         let limits = |place: u8| limits(values, usize::from(place));
+        let of_servo = |place: u8| ArmProfile::joint_name(usize::from(place - SERVOS));
+        let id = |place: u8| at(place) & !REVERSED;
         match self {
             Self::Strength(place) => ArmProfileError::Strength {
                 key: if place == TORQUE {
@@ -191,6 +267,14 @@ impl Rule {
                 limits: limits(of),
             },
             Self::NoGrip => ArmProfileError::NoGrip { position: at(OPEN) },
+            Self::Id(place) => ArmProfileError::Id {
+                joint: of_servo(place),
+                id: id(place),
+            },
+            Self::SameId(one, other) => ArmProfileError::SameId {
+                joints: [of_servo(one), of_servo(other)],
+                id: id(other),
+            },
         }
     }
 }

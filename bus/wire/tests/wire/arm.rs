@@ -1,6 +1,6 @@
 //! The arm's profile: its rules, and how its values travel.
 
-use lager_wire::{ArmLimits, ArmProfile, Profile, SettingKey};
+use lager_wire::{ArmLimits, ArmProfile, NO_SERVO, OneOrTwo, Profile, SettingKey};
 
 use crate::sample::Noise;
 
@@ -44,7 +44,7 @@ fn the_check_value_tells_profiles_apart_that_differ_in_one_bit() {
 #[test]
 fn what_no_arm_can_obey_is_refused_with_the_key() {
     let limits = |lowest, highest| ArmLimits { lowest, highest };
-    let cases: [(Change, &str); 9] = [
+    let cases: [(Change, &str); 17] = [
         (|arm| arm.torque_limit = 0, "torque_limit"),
         (|arm| arm.torque_limit = 1024, "torque_limit"),
         (|arm| arm.squeeze_load = 0, "squeeze_load"),
@@ -54,6 +54,32 @@ fn what_no_arm_can_obey_is_refused_with_the_key() {
         (|arm| arm.gripper_closed = 512, "gripper_closed"),
         (|arm| arm.drop.shoulder = 1_024, "drop"),
         (|arm| arm.carry.elbow = 1_024, "carry"),
+        (|arm| arm.servos.base = 254, "[arm.servos] base has id 254"),
+        (|arm| arm.servos.gripper = 255, "gripper has id 255"),
+        (
+            |arm| arm.servos.elbow = OneOrTwo::One(254),
+            "elbow has id 254",
+        ),
+        (
+            |arm| arm.servos.elbow = OneOrTwo::Two([4, 255]),
+            "from 0 to 253",
+        ),
+        (
+            |arm| arm.servos.wrist = 1,
+            "base and wrist have the same id 1",
+        ),
+        (|arm| arm.servos.rotation = 3, "shoulder and rotation"),
+        (
+            |arm| arm.servos.shoulder = OneOrTwo::Two([9, 9]),
+            "shoulder and shoulder have the same id 9",
+        ),
+        (
+            |arm| {
+                arm.servos.gripper = 1;
+                arm.reversed.gripper = true;
+            },
+            "give each an id of its own",
+        ),
     ];
     for (change, word) in cases {
         let mut profile = ArmProfile::default();
@@ -72,6 +98,33 @@ fn what_no_arm_can_obey_is_refused_with_the_key() {
 }
 
 #[test]
+fn an_arm_has_other_ids_single_servos_and_reversed_joints() {
+    let mut profile = ArmProfile::default();
+    assert_eq!(profile.servo_values(), [1, 2, 3, 4, 5, 6, 7, 8]);
+    profile.servos.base = 0;
+    profile.servos.shoulder = OneOrTwo::One(253);
+    profile.reversed.shoulder = true;
+    profile.reversed.elbow = true;
+    assert_eq!(profile.validate(), Ok(()));
+    let values = profile.servo_values();
+    assert_eq!(values, [0, 509, NO_SERVO, 260, 261, 6, 7, 8]);
+    assert_eq!(ArmProfile::obeyed(&profile.values()), Some(profile));
+    let ids: [_; 8] = std::array::from_fn(|index| profile.servo_id(index));
+    let told = [0, 253, 0, 4, 5, 6, 7, 8].map(Some);
+    assert_eq!(ids[..2], told[..2]);
+    assert_eq!((ids[2], &ids[3..]), (None, &told[3..]));
+}
+
+#[test]
+fn a_pair_of_which_one_servo_counts_the_other_way_is_no_pair() {
+    for (index, value) in [(26, 259), (28, 261), (24, NO_SERVO), (31, 1_032)] {
+        let mut values = ArmProfile::default().values();
+        values[index] = value;
+        assert!(!ArmProfile::is_sound(&values), "{index}");
+    }
+}
+
+#[test]
 fn board_and_configuration_judge_alike() {
     let mut noise = Noise::new(5);
     let mut sound = 0;
@@ -81,7 +134,9 @@ fn board_and_configuration_judge_alike() {
             let place = usize::from(noise.byte()) % values.len();
             values[place] = u16::from_le_bytes([noise.byte(), noise.byte() % 8]);
         }
-        let judged = ArmProfile::from_values(&values).validate().is_ok();
+        // Some values of a servo stand in no configuration.
+        let profile = ArmProfile::from_values(&values);
+        let judged = profile.values() == values && profile.validate().is_ok();
         assert_eq!(ArmProfile::is_sound(&values), judged, "{values:?}");
         sound += u32::from(judged);
     }

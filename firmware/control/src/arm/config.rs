@@ -2,7 +2,7 @@
 //! depend on how a robot is built, so they stand in the profile, which the Pi can change.
 
 use lager_ax12::table;
-use lager_wire::ArmProfile;
+use lager_wire::{ArmProfile, ArmValues};
 
 /// The arm's numbers. [`Default`] is for the simulator's robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub struct ArmConfig {
     /// (E16).
     pub sequence_speed: u16,
     /// Limits, torque, poses and the squeeze's load, until the Pi sends others.
-    pub profile: ArmProfile,
+    pub profile: ArmValues,
     /// How long a servo may take to answer, in microseconds.
     pub reply_timeout_us: u32,
     /// How often the board asks a moving servo for its state, in microseconds.
@@ -37,7 +37,7 @@ impl Default for ArmConfig {
             step: 3,
             step_speed: table::FULL_SPEED,
             sequence_speed: 100,
-            profile: ArmProfile::default(),
+            profile: ArmProfile::default().into(),
             reply_timeout_us: 3_000,
             look_period_us: 10_000,
             squeeze_period_us: 20_000,

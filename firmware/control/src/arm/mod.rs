@@ -1,13 +1,18 @@
-//! The arm: eight AX-12 servos for six joints, moved in small steps and one sequence (A1-A6,
+//! The arm: up to eight AX-12 servos for six joints, moved in small steps and one sequence (A1-A6,
 //! AMB-29..32).
 //!
 //! ```text
-//!   id   1 base   2+3 shoulder   4+5 elbow   6 wrist   7 wrist rotation   8 gripper
+//!   number   1 base   2+3 shoulder   4+5 elbow   6 wrist   7 wrist rotation   8 gripper
 //!
 //!   position grows:  1 to the left   2 up   4 out   6 tilting the gripper up
 //!                    7 counter-clockwise   8 opening
 //!   3 and 5 face their partners: their position is 1023 minus the partner's
 //! ```
+//!
+//! The profile says which id each number has, whether 3 and 5 exist, and which joints count the other
+//! way. Only `ask` and `note` know ids, and turn positions and loads round. When the profile names
+//! other servos, the command under way ends and all of them are brought into service, which makes
+//! them hold where they are.
 //!
 //! Both directions share one wire. The module uses it for these tasks, most urgent first: the
 //! command under way (`program`), bringing a servo into service, a look at the next servo (a
@@ -24,10 +29,10 @@
 //! A missing servo never delays the others: the board flags it, leaves it out and asks it again in
 //! its turn.
 //!
-//! No command moves a joint out of the limits of the profile. [`ArmProfile::validate`] checks that
-//! the poses lie inside; a step ends at a limit or is refused there. A joint can be outside if
-//! somebody moved it by hand or the limits came later. The board does not move it back by itself:
-//! only steps towards the limits are allowed.
+//! No command moves a joint out of the limits of the profile. A profile counts only if its poses lie
+//! inside; a step ends at a limit or is refused there. A joint can be outside if somebody moved it by
+//! hand or the limits came later. The board does not move it back by itself: only steps towards the
+//! limits are allowed.
 
 mod config;
 mod program;
@@ -35,9 +40,9 @@ mod servo;
 mod squeeze;
 mod task;
 
-use lager_ax12::ErrorBits;
-use lager_wire::servo::{BASE, ELBOW, ROTATION, SHOULDER, WRIST};
-use lager_wire::{ArmCommand, ArmData, ArmLimits, ArmProfile};
+use lager_ax12::{ErrorBits, table};
+use lager_wire::servo::{ELBOW, SHOULDER};
+use lager_wire::{ArmCommand, ArmData, ArmValues};
 
 pub use config::ArmConfig;
 pub use program::ArmEnd;
@@ -48,34 +53,8 @@ use crate::SteeringBoard;
 use crate::servo_bus::{ServoAnswer, ServoBus};
 use crate::time::{first, reached};
 
-/// How many servos the arm has; ids 1..=8, at index id - 1.
+/// How many servos the arm has at most; number n at index n - 1.
 pub const SERVOS: usize = ArmData::SERVOS as usize;
-
-/// The servo that faces this one, if the joint has two.
-pub(crate) const fn partner(index: usize) -> Option<usize> {
-    match index {
-        SHOULDER => Some(SHOULDER + 1),
-        ELBOW => Some(ELBOW + 1),
-        _ => None,
-    }
-}
-
-/// The limits of this servo's joint.
-fn limits(profile: &ArmProfile, joint: usize) -> ArmLimits {
-    let limits = &profile.limits;
-    match joint {
-        BASE => limits.base,
-        SHOULDER => limits.shoulder,
-        ELBOW => limits.elbow,
-        WRIST => limits.wrist,
-        ROTATION => limits.rotation,
-        _ => limits.gripper,
-    }
-}
-
-const fn id(index: usize) -> u8 {
-    index as u8 + 1
-}
 
 const fn bit(index: usize) -> u8 {
     1 << index
@@ -172,15 +151,34 @@ impl Arm {
 
     /// The profile in force.
     #[must_use]
-    pub fn profile(&self) -> &ArmProfile {
+    pub fn profile(&self) -> &ArmValues {
         &self.config.profile
     }
 
     /// Puts another profile in force; the caller has validated it. A moving servo goes on to its
-    /// old goal. Servos in service get the new torque limit without being moved.
-    pub fn set_profile(&mut self, profile: ArmProfile) {
-        self.torque_untold |= profile.torque_limit != self.config.profile.torque_limit;
-        self.config.profile = profile;
+    /// old goal. Servos in service get the new torque limit without being moved. If the profile
+    /// names other servos or directions, the command under way is broken off, and every servo is
+    /// brought into service where it is.
+    pub fn set_profile(&mut self, profile: ArmValues) {
+        let before = core::mem::replace(&mut self.config.profile, profile);
+        self.torque_untold |= profile.torque_limit() != before.torque_limit();
+        if profile.has_servos_of(&before) {
+            return;
+        }
+        self.servos = [Servo::default(); SERVOS];
+        // The answer to the question under way is of no servo that is known now.
+        self.asked = None;
+        self.tell_all();
+        if !matches!(self.program, Program::Idle) {
+            self.failed = true;
+            self.finish();
+        }
+    }
+
+    /// The servo that faces this one, if the joint has two.
+    fn partner(&self, index: usize) -> Option<usize> {
+        let has_two = matches!(index, SHOULDER | ELBOW) && self.profile().has(index + 1);
+        has_two.then_some(index + 1)
     }
 
     /// Stops the moving servos where they are. [`Arm::poll`] returns the end when that is done.
@@ -240,7 +238,7 @@ impl Arm {
         self.untold &= !bit(index);
         let servo = &self.servos[index];
         Some(ArmData {
-            servo: id(index),
+            servo: index as u8 + 1,
             errors: servo.errors.bits(),
             position: servo.look.position,
             load: servo.look.load,
@@ -260,7 +258,7 @@ impl Arm {
         self.untold = u8::MAX;
     }
 
-    /// Servos in trouble, id 1 in bit 0: missing, stuck, or reporting an error.
+    /// Servos in trouble, number 1 in bit 0: missing, stuck, or reporting an error.
     #[must_use]
     pub fn errors(&self) -> u8 {
         let mut errors = 0;
@@ -301,7 +299,7 @@ impl Arm {
             .iter()
             .enumerate()
             .find_map(|(index, servo)| match servo.setup {
-                Setup::Unseen => Some(Job::Look(index)),
+                Setup::Unseen => self.profile().has(index).then_some(Job::Look(index)),
                 Setup::Seen => Some(Job::Goal {
                     index,
                     speed: self.config.sequence_speed,
@@ -321,7 +319,11 @@ impl Arm {
         if !reached(now_us, self.round_due_us) {
             return None;
         }
-        let index = self.next_round;
+        let mut index = self.next_round;
+        // No two servos in a row are absent.
+        if !self.profile().has(index) {
+            index += 1;
+        }
         self.next_round = (index + 1) % SERVOS;
         self.round_due_us = now_us.wrapping_add(self.config.round_period_us);
         self.untold |= bit(index);
@@ -329,17 +331,19 @@ impl Arm {
     }
 
     fn ask(&mut self, job: Job, board: &mut impl SteeringBoard, now_us: u32) {
+        let profile = self.config.profile;
+        let id = profile.id(job.index());
         match job {
-            Job::Look(index) => self.bus.look(id(index), board, now_us),
+            Job::Look(_) => self.bus.look(id, board, now_us),
             Job::Goal { index, speed } => {
-                let values = (
-                    self.servos[index].goal,
-                    speed,
-                    self.config.profile.torque_limit,
-                );
-                self.bus.set_goal(id(index), values, board, now_us);
+                let mut goal = self.servos[index].goal;
+                if profile.is_reversed(index) {
+                    goal = table::MAX_POSITION - goal;
+                }
+                let values = (goal, speed, profile.torque_limit());
+                self.bus.set_goal(id, values, board, now_us);
             }
-            Job::SwitchOn(index) => self.bus.switch_on(id(index), board, now_us),
+            Job::SwitchOn(_) => self.bus.switch_on(id, board, now_us),
         }
     }
 
@@ -348,6 +352,7 @@ impl Arm {
         const NOT_DONE: ErrorBits = ErrorBits::CHECKSUM
             .union(ErrorBits::INSTRUCTION)
             .union(ErrorBits::RANGE);
+        let is_reversed = self.profile().is_reversed(job.index());
         let servo = &mut self.servos[job.index()];
         let ServoAnswer::Status { errors, look } = answer else {
             servo.setup = Setup::Missing;
@@ -356,7 +361,13 @@ impl Arm {
         servo.errors = errors;
         let done = !errors.intersects(NOT_DONE);
         match (job, look) {
-            (Job::Look(_), Some(look)) => servo.seen(look),
+            (Job::Look(_), Some(mut look)) => {
+                if is_reversed {
+                    look.position = table::MAX_POSITION - look.position;
+                    look.load = -look.load;
+                }
+                servo.seen(look);
+            }
             (Job::Look(_), None) => {
                 servo.setup = Setup::Missing;
                 return false;

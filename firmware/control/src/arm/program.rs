@@ -22,7 +22,7 @@ use lager_wire::{ArmCommand, ArmPose};
 
 use super::servo::NEAR_GOAL;
 use super::task::{Freeze, GIVES_UP, Move, Program, Then};
-use super::{Arm, Job, SERVOS, bit, limits, partner};
+use super::{Arm, Job, SERVOS, bit};
 use crate::time::reached;
 
 /// How a command of the arm ended.
@@ -48,7 +48,7 @@ impl Arm {
             ArmCommand::Clockwise => return self.step(ROTATION, false, now_us),
             ArmCommand::Squeeze => self.squeeze(now_us),
             ArmCommand::Release => self.open(Then::Nothing, now_us),
-            ArmCommand::Drop => self.take_pose(self.config.profile.drop, Then::Open, now_us),
+            ArmCommand::Drop => self.take_pose(self.profile().drop_pose(), Then::Open, now_us),
         }
         true
     }
@@ -143,15 +143,14 @@ impl Arm {
 
     /// One small step of a joint. `false`: the joint is at its limit already.
     fn step(&mut self, joint: usize, forward: bool, now_us: u32) -> bool {
-        let partner = partner(joint);
-        let base = match partner {
+        let base = match self.partner(joint) {
             Some(partner) if !self.servos[joint].is_ready() => {
                 table::MAX_POSITION - self.servos[partner].base()
             }
             _ => self.servos[joint].base(),
         };
         let step = self.config.step;
-        let limits = limits(&self.config.profile, joint);
+        let limits = self.profile().limits(joint);
         let (way_left, goal) = if forward {
             let goal = base.saturating_add(step).min(limits.highest);
             (base < limits.highest, goal)
@@ -164,7 +163,7 @@ impl Arm {
             return false;
         }
         let mut goals = Goals::default();
-        goals.joint(joint, goal);
+        self.aim(&mut goals, joint, goal);
         let (speed, timeout_us) = (self.config.step_speed, self.config.step_timeout_us);
         self.go(
             &goals,
@@ -187,15 +186,23 @@ impl Arm {
             (ELBOW, pose.elbow),
             (WRIST, pose.wrist),
         ] {
-            goals.joint(joint, position);
+            self.aim(&mut goals, joint, position);
         }
         self.go_softly(&goals, then, now_us);
     }
 
     fn open(&mut self, then: Then, now_us: u32) {
         let mut goals = Goals::default();
-        goals.joint(GRIPPER, self.config.profile.gripper_open);
+        self.aim(&mut goals, GRIPPER, self.profile().gripper_open());
         self.go_softly(&goals, then, now_us);
+    }
+
+    /// Sets a joint's goal, and that of its mirrored servo.
+    fn aim(&self, goals: &mut Goals, joint: usize, goal: u16) {
+        goals[joint] = Some(goal);
+        if let Some(partner) = self.partner(joint) {
+            goals[partner] = Some(table::MAX_POSITION - goal);
+        }
     }
 
     fn go_softly(&mut self, goals: &Goals, then: Then, now_us: u32) {
@@ -216,7 +223,7 @@ impl Arm {
     fn go(&mut self, goals: &Goals, manner: Manner, now_us: u32) {
         let mut write = 0;
         for index in 0..SERVOS {
-            let Some(goal) = goals.0[index] else { continue };
+            let Some(goal) = goals[index] else { continue };
             self.touched |= bit(index);
             if self.servos[index].is_ready() {
                 self.servos[index].goal = goal;
@@ -308,7 +315,7 @@ impl Arm {
         match movement.then {
             Then::Nothing => self.finish(),
             Then::Open => self.open(Then::Raise, now_us),
-            Then::Raise => self.take_pose(self.config.profile.neutral, Then::Nothing, now_us),
+            Then::Raise => self.take_pose(self.profile().neutral(), Then::Nothing, now_us),
         }
     }
 
@@ -329,18 +336,7 @@ impl Arm {
 }
 
 /// Goals for some of the servos.
-#[derive(Default)]
-struct Goals([Option<u16>; SERVOS]);
-
-impl Goals {
-    /// Sets a joint's goal, and that of its mirrored servo.
-    fn joint(&mut self, joint: usize, goal: u16) {
-        self.0[joint] = Some(goal);
-        if let Some(partner) = partner(joint) {
-            self.0[partner] = Some(table::MAX_POSITION - goal);
-        }
-    }
-}
+type Goals = [Option<u16>; SERVOS];
 
 /// How a Move goes.
 struct Manner {

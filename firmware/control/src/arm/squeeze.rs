@@ -62,7 +62,7 @@ impl Arm {
             squeeze.last_position = position;
         }
         let gave_up = servo.errors.intersects(GIVES_UP);
-        let loaded = servo.look.load.unsigned_abs() >= self.config.profile.squeeze_load;
+        let loaded = servo.look.load.unsigned_abs() >= self.profile().squeeze_load();
         let closed = servo.goal == self.closer(servo.goal) && servo.distance() <= self.config.step;
         if gave_up || loaded || closed || squeeze.still >= STILL_STEPS {
             self.failed |= gave_up;
@@ -76,8 +76,8 @@ impl Arm {
 
     /// One step towards the closed gripper and not beyond it.
     fn closer(&self, position: u16) -> u16 {
-        let profile = &self.config.profile;
-        let (open, closed) = (profile.gripper_open, profile.gripper_closed);
+        let profile = self.profile();
+        let (open, closed) = (profile.gripper_open(), profile.gripper_closed());
         let step = self.config.step;
         if closed < open {
             position.saturating_sub(step).max(closed)

@@ -32,7 +32,7 @@ mod orders;
 use ends::End;
 use lager_wire::link::BoardLink;
 use lager_wire::{
-    ArmCommand, ArmProfile, COMMAND_AGE, Callsign, LineBits, LineState, ResetCause, SteeringProfile,
+    ArmCommand, ArmValues, COMMAND_AGE, Callsign, LineBits, LineState, ResetCause, SteeringProfile,
 };
 
 use crate::arm::{Arm, ArmConfig, ArmEnd, Start};
@@ -134,7 +134,7 @@ pub struct SteeringUnit {
     arm_waiting: Option<ArmOrder>,
     arm_running: Option<ArmOrder>,
     /// The arm's profile that the Pi is sending.
-    told_arm: Told<ArmProfile>,
+    told_arm: Told<ArmValues>,
     /// The description of the robot that the Pi is sending.
     told: Told<SteeringProfile>,
     /// Whether the battery's voltage is at the board's input.

@@ -39,6 +39,8 @@ pub struct Servo {
 #[derive(Clone, Debug)]
 pub struct Servos {
     pub servos: Vec<Servo>,
+    /// The id of each of them.
+    pub ids: [u8; 8],
     decoder: InstructionDecoder,
     answers: VecDeque<(u32, u8)>,
     moved_us: Option<u32>,
@@ -70,6 +72,7 @@ impl Servos {
             .collect();
         Self {
             servos,
+            ids: [1, 2, 3, 4, 5, 6, 7, 8],
             decoder: InstructionDecoder::new(),
             answers: VecDeque::new(),
             moved_us: None,
@@ -78,8 +81,9 @@ impl Servos {
     }
 
     /// Servo by its id.
-    pub fn id(&mut self, id: usize) -> &mut Servo {
-        &mut self.servos[id - 1]
+    pub fn id(&mut self, id: u8) -> &mut Servo {
+        let place = self.ids.iter().position(|own| *own == id);
+        &mut self.servos[place.expect("a servo with this id")]
     }
 
     pub fn positions(&self) -> Vec<u16> {
@@ -117,10 +121,11 @@ impl Servos {
             };
             let (id, instruction) = (packet.id, packet.instruction());
             let parameters = packet.parameters.to_vec();
-            let servo = &mut self.servos[usize::from(id) - 1];
-            if !servo.present {
+            let place = self.ids.iter().position(|own| *own == id);
+            let servo = place.map(|place| &mut self.servos[place]);
+            let Some(servo) = servo.filter(|servo| servo.present) else {
                 continue;
-            }
+            };
             let registers = servo.obey(instruction.expect("a known instruction"), &parameters);
             let name = if servo.misnamed > 0 { id % 8 + 1 } else { id };
             servo.misnamed = servo.misnamed.saturating_sub(1);
