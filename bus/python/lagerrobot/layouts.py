@@ -589,7 +589,7 @@ class Health(Layout):
 
 class Failure(Layout):
     _type_name_ = "lager::Failure"
-    _hash_ = 0x3C7CC4FB46FA7DB4
+    _hash_ = 0xEE501BB4A04C1260
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
@@ -609,7 +609,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x16E71831DADD4315
+    _hash_ = 0x5C9EF711BA07B334
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -939,7 +939,7 @@ class OrderQueue(Layout):
 
 class Event(Layout):
     _type_name_ = "lager::Event"
-    _hash_ = 0x50F97CFB12CB7B5A
+    _hash_ = 0xB6FBF34308F3F26F
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -960,7 +960,7 @@ class Event(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0x69FC0AEE99E8D73D
+    _hash_ = 0x8A944A60FBB551E8
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),
