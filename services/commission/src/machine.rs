@@ -1,0 +1,683 @@
+//! [`Commissioning`]: the steps one after the other, and everything that can end one.
+//!
+//! ```text
+//!            answer                      the boards obey it
+//!    asks ──────────> the description ──────────────────────> asks the next question
+//!     │  ^             is tried
+//!     │  '───────────────────────────────────────┐
+//!     │ answer "lifted", "go"                    │ half a second, or the person's next answer
+//!     '────────────────────> the wheels turn ────┘
+//! ```
+//!
+//! In every state a failure ends the step: the robot stands, what held before the step holds again,
+//! and the step begins anew with a sentence that says why.
+
+use core::time::Duration;
+
+use lager_operator::{Driving, For, Ids, Seen};
+use lager_orders::{Mode, Moment, Reason};
+use lager_topics::{Calibration, Health, ProfileState, SteeringOrder, SteeringReport};
+use lager_wire::{
+    BUILD, Centimetres, FULL_TURNS_MS, LineBits, OperatorCommand, RobotProfile, Speed, Version,
+};
+
+use crate::answer::{Answer, Way};
+use crate::range::{DISTANCES_CM, MEASURING, Point};
+use crate::recent::Recent;
+use crate::step::{Question, Step};
+use crate::words::Said;
+use crate::{line, range, wheels};
+
+/// How long the wheels turn when they are lifted.
+const PULSE: Duration = Duration::from_millis(500);
+/// How long the steering board may take to begin a movement.
+const BEGIN: Duration = Duration::from_secs(1);
+/// How long the boards may take to obey a description.
+const TELL: Duration = Duration::from_secs(5);
+/// A description that was given just now shows in `link/health` after this time at the latest.
+const SHOWN: Duration = Duration::from_millis(300);
+/// How long a calibration may take; the board watches its sensors for 5 s.
+const CALIBRATE: Duration = Duration::from_secs(8);
+/// The longest movement that waits for an answer.
+const LONGEST: Duration = Duration::from_secs(60);
+/// Without a new `link/health` for this long, nobody knows how the boards are.
+const UNHEARD: Duration = Duration::from_secs(1);
+/// How far a meter's voltage may be from the board's, in tenths of a volt.
+const METER: u8 = 10;
+/// Possible lengths of a measured drive, in cm.
+const LENGTHS_CM: [f32; 2] = [30.0, 300.0];
+/// Possible speeds, in mm/s.
+const SPEEDS_MM_PER_S: [f32; 2] = [10.0, 1_000.0];
+
+/// How a robot is built, as far as commissioning finds it out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Built {
+    /// What the boards are told.
+    pub robot: RobotProfile,
+    /// The speed with both motors at their duty, in mm/s.
+    pub cruise_mm_per_s: f32,
+}
+
+/// Something that the caller must do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Effect {
+    /// Let the boards obey this description.
+    Describe(RobotProfile),
+    /// Publish an order to the wheels.
+    Steer(SteeringOrder),
+    /// Let the sensor board calibrate its line sensors.
+    Calibrate,
+    /// Save this for good.
+    Keep(Built),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    /// Waits for an answer.
+    Asks,
+    /// The boards are told a description.
+    Tells { since: Duration },
+    /// The sensor board watches its line sensors.
+    Calibrates { since: Duration, ended_before: u8 },
+    /// The wheels turn, until a time after their beginning or until the next answer.
+    Moves {
+        since: Duration,
+        begun: Option<Duration>,
+        is_pulse: bool,
+    },
+    /// Everything is said.
+    Over,
+}
+
+/// What the present step has found out so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    floor: u16,
+    far: Point,
+    ahead: Option<[Way; 2]>,
+    length_mm: f32,
+}
+
+/// A commissioning.
+#[derive(Clone, Debug)]
+pub struct Commissioning {
+    state: State,
+    question: Question,
+    step: Step,
+    built: Built,
+    /// What held before each step.
+    before: [Built; Step::ALL.len()],
+    /// What the boards were told last.
+    told: RobotProfile,
+    found: Found,
+    health: Option<(Duration, Health)>,
+    /// The lives of both links since the step began.
+    epochs: Option<[u32; 2]>,
+    report: Option<SteeringReport>,
+    bits: Recent<u16>,
+    readings: Recent<u16>,
+    volts: Recent<u8>,
+    driving: Driving,
+    ids: Ids,
+    effects: Vec<Effect>,
+    said: Vec<Said>,
+}
+
+impl Commissioning {
+    /// Begins with the boards, of a robot that is described so.
+    pub fn new(built: Built) -> Self {
+        Self {
+            state: State::Asks,
+            question: Question::Boards,
+            step: Step::Boards,
+            built,
+            before: [built; Step::ALL.len()],
+            told: built.robot,
+            found: Found::default(),
+            health: None,
+            epochs: None,
+            report: None,
+            bits: Recent::default(),
+            readings: Recent::default(),
+            volts: Recent::default(),
+            driving: Driving::default(),
+            ids: Ids::default(),
+            effects: Vec::new(),
+            said: Vec::new(),
+        }
+    }
+
+    /// The present step.
+    pub const fn step(&self) -> Step {
+        self.step
+    }
+
+    /// What is asked now; `None` while something must happen first, or when all is over.
+    pub fn question(&self) -> Option<Question> {
+        match self.state {
+            State::Asks
+            | State::Moves {
+                is_pulse: false, ..
+            } => Some(self.question),
+            _ => None,
+        }
+    }
+
+    /// Whether it has ended.
+    pub fn is_over(&self) -> bool {
+        self.state == State::Over
+    }
+
+    /// Whether it lets the robot move at present.
+    pub const fn moves(&self) -> bool {
+        self.driving.is_running()
+    }
+
+    /// How the robot is built, by what is known so far.
+    pub const fn built(&self) -> Built {
+        self.built
+    }
+
+    /// Takes the list of things to do.
+    pub fn effects(&mut self) -> Vec<Effect> {
+        core::mem::take(&mut self.effects)
+    }
+
+    /// Takes what there is to say: results, and why something does not go on.
+    pub fn said(&mut self) -> Vec<Said> {
+        core::mem::take(&mut self.said)
+    }
+
+    /// The values that belong to the present step, as they are now.
+    pub fn shown(&self, now: Duration) -> Said {
+        let none = || Said::from("live_none");
+        match (self.state, self.step) {
+            (State::Tells { .. }, _) => "live_tells".into(),
+            (State::Calibrates { .. }, _) => {
+                let sensors = self.health.iter().flat_map(|(_, health)| health.calibrated);
+                let count = sensors.filter(|sensor| sensor.tells_apart != 0).count();
+                Said::new("live_calibration", &[("count", &count)])
+            }
+            (
+                State::Moves {
+                    begun: Some(begun),
+                    is_pulse: false,
+                    ..
+                },
+                _,
+            ) => {
+                let seconds = format!("{:.1}", now.saturating_sub(begun).as_secs_f32());
+                Said::new("live_seconds", &[("seconds", &seconds)])
+            }
+            (_, Step::Line) => self.bits.mode(now).map_or_else(none, |bits| {
+                Said::new("live_line", &[("bits", &line::bar(bits))])
+            }),
+            (_, Step::Distance) => self.readings.median(now).map_or_else(none, |reading| {
+                Said::new("live_range", &[("reading", &reading)])
+            }),
+            (_, Step::Wheels | Step::Turn | Step::Speed) => {
+                self.report.map_or_else(none, |report| {
+                    let duties: [(_, &dyn ToString); 2] =
+                        [("left", &report.left_duty), ("right", &report.right_duty)];
+                    Said::new("live_wheels", &duties)
+                })
+            }
+            (_, Step::Battery) => self.volts(now).map_or_else(none, |[low, high]| {
+                let values: [(_, &dyn ToString); 2] = [("low", &volts(low)), ("high", &volts(high))];
+                Said::new("live_battery", &values)
+            }),
+            (_, Step::Boards | Step::Finish) => {
+                let health = self.health.map(|(_, health)| health).unwrap_or_default();
+                let board = |board: lager_topics::BoardHealth| match board.up {
+                    0 => Said::from("board_gone"),
+                    _ => Said::new("board_up", &[("build", &board.build)]),
+                };
+                Said::of(
+                    "live_boards",
+                    [
+                        ("sensor", board(health.sensor)),
+                        ("steering", board(health.steering)),
+                    ],
+                )
+            }
+        }
+    }
+}
+
+/// What the robot tells.
+impl Commissioning {
+    /// To be called with each `link/health`.
+    pub fn health(&mut self, now: Moment, health: &Health) {
+        self.health = Some((now.robot, *health));
+        self.driving.refused(now.robot, health);
+        let epochs = [health.sensor.epoch, health.steering.epoch];
+        let up = [health.sensor.up, health.steering.up];
+        if self.step == Step::Boards {
+            return;
+        }
+        if up.contains(&0) || self.epochs.is_some_and(|before| before != epochs) {
+            return self.to_boards(now, "board_changed");
+        }
+        self.epochs = Some(epochs);
+        match self.state {
+            State::Tells { since } if now.robot >= since + SHOWN && is_obeyed(health) => {
+                // Of what came meanwhile nobody knows by which description it was made.
+                self.bits.clear();
+                self.readings.clear();
+                self.volts.clear();
+                self.state = State::Asks;
+            }
+            State::Calibrates { ended_before, .. }
+                if health.calibrations_ended != ended_before =>
+            {
+                match (health.calibration_failure(), line::dull(health)) {
+                    (None, _) => self.ask(Question::LineFloor),
+                    (Some(_), Some(dull)) if health.calibration == Calibration::Partly => {
+                        self.fail(now, dull);
+                    }
+                    (Some(why), _) => self.fail(now, why),
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// To be called with the line sensors' bits of each frame.
+    pub fn line(&mut self, now: Duration, bits: u16) {
+        if bits & !LineBits::MASK == 0 {
+            self.bits.push(now, bits);
+        }
+    }
+
+    /// To be called with each distance, in cm.
+    pub fn distance(&mut self, now: Duration, cm: u8) {
+        let told = Centimetres(cm).get();
+        self.readings.push(now, told.map_or(0, range::reading));
+    }
+
+    /// To be called with each `steering/state`.
+    pub fn reported(&mut self, now: Duration, report: &SteeringReport) {
+        if report.age_ms == 0 {
+            self.volts.push(now, report.battery_decivolts);
+        }
+        self.report = Some(*report);
+        self.driving.reported(now, report);
+        if let State::Moves { begun, .. } = &mut self.state
+            && begun.is_none()
+            && self.driving.has_begun()
+        {
+            *begun = Some(now);
+        }
+    }
+
+    /// To be called at least every 10 ms.
+    pub fn turn(&mut self, now: Moment) {
+        if let Some(order) = self.driving.renew(now.robot) {
+            self.effects.push(Effect::Steer(order));
+        }
+        if let Some(Err(why)) = self.driving.ended().pop().map(|ended| ended.result) {
+            return self.fail(now, why);
+        }
+        let is_busy = !matches!(self.state, State::Asks | State::Over);
+        if is_busy && self.known(now.robot).is_none() {
+            return self.to_boards(now, "bridge_silent");
+        }
+        let past = |since: Duration, span| now.robot >= since + span;
+        match self.state {
+            State::Tells { since } if past(since, TELL) => self.to_boards(now, "undescribed"),
+            State::Calibrates { since, .. } if past(since, CALIBRATE) => {
+                self.fail(now, Reason::from(lager_orders::Code::CalibrationSilent));
+            }
+            State::Moves {
+                since, begun: None, ..
+            } if past(since, BEGIN) => self.fail(now, "unmoved"),
+            State::Moves {
+                begun: Some(begun),
+                is_pulse: true,
+                ..
+            } if past(begun, PULSE) => {
+                self.stand(now);
+                self.ask(match self.question {
+                    Question::WheelsAhead => Question::SawAhead,
+                    _ => Question::SawLeft,
+                });
+            }
+            State::Moves { since, .. } if past(since, LONGEST) => {
+                let seconds = LONGEST.as_secs();
+                self.fail(now, Said::new("too_long", &[("seconds", &seconds)]));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What the person says.
+impl Commissioning {
+    /// Takes an answer.
+    pub fn answer(&mut self, now: Moment, answer: Answer) {
+        match (answer, self.state) {
+            (_, State::Over) => {}
+            (Answer::Again, _) => self.enter(now, self.step),
+            (Answer::Skip, _) => self.enter_unchanged(now, self.step.next()),
+            (Answer::Back, _) => self.enter(now, self.step.before()),
+            (_, State::Asks) => {
+                if let Err(why) = self.answered(now, answer) {
+                    self.fail(now, why);
+                }
+            }
+            (
+                Answer::Yes,
+                State::Moves {
+                    begun: Some(begun),
+                    is_pulse: false,
+                    ..
+                },
+            ) => {
+                self.stand(now);
+                if let Err(why) = self.measured(now, now.robot.saturating_sub(begun)) {
+                    self.fail(now, why);
+                }
+            }
+            // Whatever a person types while the robot moves, he wants it to stand.
+            (_, State::Moves { .. }) => self.fail(now, "broken_off"),
+            (_, State::Tells { .. } | State::Calibrates { .. }) => self.said.push("wait".into()),
+        }
+    }
+
+    /// Ends it: the robot stands, and the boards obey what they obeyed before.
+    pub fn quit(&mut self, now: Moment) {
+        self.stand(now);
+        self.built = self.before[0];
+        self.tell(now, self.built.robot);
+        self.state = State::Over;
+    }
+
+    fn answered(&mut self, now: Moment, answer: Answer) -> Result<(), Said> {
+        let silent = || Said::from("no_values");
+        match (self.question, answer) {
+            (Question::Boards, Answer::Yes) => {
+                self.boards_fit(now.robot)?;
+                self.enter_unchanged(now, Step::Line);
+            }
+            (Question::LineSway, Answer::Yes) => {
+                let health = self.known(now.robot).ok_or("bridge_silent")?;
+                self.effects.push(Effect::Calibrate);
+                self.state = State::Calibrates {
+                    since: now.robot,
+                    ended_before: health.calibrations_ended,
+                };
+            }
+            (Question::LineFloor, Answer::Yes) => {
+                self.found.floor = self.bits.mode(now.robot).ok_or_else(silent)?;
+                self.ask(Question::LineTape);
+            }
+            (Question::LineTape, Answer::Yes) => {
+                let tape = self.bits.mode(now.robot).ok_or_else(silent)?;
+                let is_inverted = line::is_inverted(self.found.floor, tape)?;
+                let line = &mut self.built.robot.sensors.line;
+                line.dark_is_high ^= is_inverted;
+                let said = match line.dark_is_high {
+                    true => "found_polarity_high",
+                    false => "found_polarity_low",
+                };
+                self.done(now, said);
+            }
+            (Question::RangeFar, Answer::Number(cm)) => {
+                self.found.far = self.point(now.robot, cm)?;
+                self.ask(Question::RangeNear);
+            }
+            (Question::RangeNear, Answer::Number(cm)) => {
+                let near = self.point(now.robot, cm)?;
+                let ranger = range::sensor(self.found.far, near)?;
+                self.built.robot.sensors.ranger = ranger;
+                self.done(now, range::said(&ranger));
+            }
+            (Question::WheelsAhead, Answer::Yes) => {
+                self.begin(now, OperatorCommand::Forward(Speed::Full), true)?;
+            }
+            (Question::WheelsLeft, Answer::Yes) => {
+                self.begin(now, OperatorCommand::Left(Speed::Full), true)?;
+            }
+            (Question::SawAhead, Answer::Ways(ways)) => {
+                if ways.contains(&Way::Still) {
+                    return Err("wheel_still".into());
+                }
+                self.found.ahead = Some(ways);
+                self.ask(Question::WheelsLeft);
+            }
+            (Question::SawLeft, Answer::Ways(left)) => {
+                let ahead = self.found.ahead.unwrap_or([Way::Still; 2]);
+                let plain = self.built.robot.steering.wheels;
+                let wheels = wheels::connected(plain, ahead, left)?;
+                self.built.robot.steering.wheels = wheels;
+                self.done(now, wheels::said(&wheels));
+            }
+            (Question::Battery, Answer::No) => {
+                self.built.robot.steering.divider = false;
+                self.done(now, "found_no_divider");
+            }
+            (Question::Battery, Answer::Number(meter)) => {
+                let [low, high] = self.volts(now.robot).ok_or_else(silent)?;
+                let meter_decivolts = (meter * 10.0).round().clamp(0.0, 255.0) as u8;
+                let is_near = |value: u8| value.abs_diff(meter_decivolts) <= METER;
+                if !is_near(low) || !is_near(high) {
+                    let values: [(_, &dyn ToString); 3] =
+                        [("low", &volts(low)), ("high", &volts(high)), ("volts", &meter)];
+                    return Err(Said::new("battery_unfit", &values));
+                }
+                self.built.robot.steering.divider = true;
+                self.done(now, "found_divider");
+            }
+            (Question::Turn, Answer::Yes) => {
+                self.begin(now, OperatorCommand::Left(Speed::Full), false)?;
+                self.question = Question::TurnRound;
+            }
+            (Question::Speed, Answer::Number(cm)) => {
+                let [least, most] = LENGTHS_CM;
+                within(cm, least, most)?;
+                self.found.length_mm = cm * 10.0;
+                self.begin(now, OperatorCommand::FollowForward, false)?;
+                self.question = Question::SpeedThere;
+            }
+            (Question::Finish, Answer::Yes) => {
+                self.effects.push(Effect::Keep(self.built));
+                self.state = State::Over;
+            }
+            (Question::Finish, Answer::No) => self.quit(now),
+            // A person who says no to a movement, or not yet, is asked again.
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A movement that waited for an answer has taken so long.
+    fn measured(&mut self, now: Moment, span: Duration) -> Result<(), Said> {
+        if self.question == Question::TurnRound {
+            let [least, most] = [*FULL_TURNS_MS.start(), *FULL_TURNS_MS.end()];
+            let ms = u16::try_from(span.as_millis()).unwrap_or(u16::MAX);
+            if !FULL_TURNS_MS.contains(&ms) {
+                let values: [(_, &dyn ToString); 3] =
+                    [("ms", &ms), ("least", &least), ("most", &most)];
+                return Err(Said::new("turn_unfit", &values));
+            }
+            self.built.robot.steering.wheels.full_turn_ms = ms;
+            self.done(now, Said::new("found_turn", &[("ms", &ms)]));
+            return Ok(());
+        }
+        let speed = (self.found.length_mm / span.as_secs_f32() * 10.0).round() / 10.0;
+        let [least, most] = SPEEDS_MM_PER_S;
+        if !(least..=most).contains(&speed) {
+            let values: [(_, &dyn ToString); 3] =
+                [("speed", &speed), ("least", &least), ("most", &most)];
+            return Err(Said::new("speed_unfit", &values));
+        }
+        self.built.cruise_mm_per_s = speed;
+        self.done(now, Said::new("found_speed", &[("speed", &speed)]));
+        Ok(())
+    }
+
+    /// Whether both boards are there, fit, and may be moved by hand.
+    fn boards_fit(&self, now: Duration) -> Result<(), Said> {
+        let health = self.known(now).ok_or("bridge_silent")?;
+        for board in [&health.sensor, &health.steering] {
+            if board.up == 0 {
+                return Err("not_both_boards".into());
+            }
+            if board.version == Version::Original as u8 {
+                return Err("original_board".into());
+            }
+            if board.misfit().is_some() {
+                let values: [(_, &dyn ToString); 2] = [("build", &board.build), ("wanted", &BUILD)];
+                return Err(Said::new("board_misfit", &values));
+            }
+        }
+        if health.mode != Mode::Manual {
+            return Err("not_by_hand".into());
+        }
+        if health.stopped != 0 {
+            return Err("stop_in_force".into());
+        }
+        if !is_obeyed(health) {
+            return Err("undescribed".into());
+        }
+        Ok(())
+    }
+
+    /// A known distance, and what the sensor reads there.
+    fn point(&self, now: Duration, cm: f32) -> Result<Point, Said> {
+        let [least, most] = DISTANCES_CM;
+        within(cm, least.into(), most.into())?;
+        let reading = self.readings.median(now).ok_or("no_values")?;
+        Ok((cm.round() as u8, reading))
+    }
+
+    /// The least and the greatest voltage of the last half second, in tenths of a volt.
+    fn volts(&self, now: Duration) -> Option<[u8; 2]> {
+        let all = self.volts.all(now)?;
+        Some([*all.first()?, *all.last()?])
+    }
+
+    /// `link/health`, if it is new.
+    fn known(&self, now: Duration) -> Option<&Health> {
+        let (at, health) = self.health.as_ref()?;
+        (*at + UNHEARD > now).then_some(health)
+    }
+}
+
+/// How it goes from one state to the next.
+impl Commissioning {
+    fn ask(&mut self, question: Question) {
+        self.question = question;
+        self.state = State::Asks;
+    }
+
+    /// The step has a result.
+    fn done(&mut self, now: Moment, result: impl Into<Said>) {
+        self.said.push(result.into());
+        let next = self.step.next();
+        self.before[next as usize] = self.built;
+        self.enter(now, next);
+    }
+
+    /// Leaves the step without a result.
+    fn enter_unchanged(&mut self, now: Moment, next: Step) {
+        let built = self.before[self.step as usize];
+        self.before[next as usize] = built;
+        self.enter(now, next);
+    }
+
+    /// Begins a step with what held before it.
+    fn enter(&mut self, now: Moment, step: Step) {
+        self.stand(now);
+        self.step = step;
+        self.found = Found::default();
+        self.epochs = None;
+        self.built = self.before[step as usize];
+        let mut trial = self.built.robot;
+        match step {
+            Step::Distance => trial.sensors.ranger = MEASURING,
+            Step::Wheels => trial.steering.wheels = wheels::plain(trial.steering.wheels),
+            Step::Battery => trial.steering.divider = true,
+            _ => {}
+        }
+        self.ask(step.first());
+        self.tell(now, trial);
+    }
+
+    /// Lets the boards obey a description, if they do not yet.
+    fn tell(&mut self, now: Moment, robot: RobotProfile) {
+        if robot != self.told {
+            self.told = robot;
+            self.effects.push(Effect::Describe(robot));
+            self.state = State::Tells { since: now.robot };
+        }
+    }
+
+    /// Ends the step, which begins anew.
+    fn fail(&mut self, now: Moment, why: impl Into<Said>) {
+        self.said.push(Said::of("ended", [("why", why.into())]));
+        self.enter(now, self.step);
+    }
+
+    /// A board has gone, or nobody knows how it is: the person looks at the boards first.
+    fn to_boards(&mut self, now: Moment, why: &'static str) {
+        self.fail(now, why);
+        let built = self.built;
+        self.step = Step::Boards;
+        self.before[Step::Boards as usize] = self.before[0];
+        self.before[Step::Line as usize] = built;
+        self.ask(Question::Boards);
+    }
+
+    fn begin(&mut self, now: Moment, command: OperatorCommand, is_pulse: bool) -> Result<(), Said> {
+        let health = self.known(now.robot).ok_or("bridge_silent")?;
+        let seen = Seen {
+            health: Some(*health),
+            ..Seen::default()
+        };
+        seen.may_move(command)?;
+        self.steer(now, command);
+        self.state = State::Moves {
+            since: now.robot,
+            begun: None,
+            is_pulse,
+        };
+        Ok(())
+    }
+
+    /// Stands, if it does not yet.
+    fn stand(&mut self, now: Moment) {
+        if self.driving.is_running() {
+            self.steer(now, OperatorCommand::Stop);
+            self.driving.let_go(lager_orders::Code::Replaced);
+            self.driving.ended();
+        }
+    }
+
+    fn steer(&mut self, now: Moment, command: OperatorCommand) {
+        let id = self.ids.fresh(now.ns);
+        let whose = For::Question;
+        let order = self.driving.begin(now, Duration::ZERO, id, command, whose);
+        self.driving.ended();
+        self.effects.push(Effect::Steer(order));
+    }
+}
+
+/// Whether both boards obey what they were told.
+fn is_obeyed(health: &Health) -> bool {
+    [health.steering_profile, health.sensor_profile]
+        .iter()
+        .all(|told| *told == ProfileState::Accepted)
+}
+
+fn within(value: f32, least: f32, most: f32) -> Result<(), Said> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let values: [(_, &dyn ToString); 3] = [("value", &value), ("least", &least), ("most", &most)];
+    Err(Said::new("number_unfit", &values))
+}
+
+fn volts(decivolts: u8) -> String {
+    format!("{:.1}", f32::from(decivolts) / 10.0)
+}
