@@ -17,7 +17,7 @@ use crate::setting::{Setting, SettingKey};
 /// A part of the description of a robot that one board is told.
 pub trait Profile: Sized {
     /// An array of the values that the board receives.
-    type Values: AsRef<[u16]> + AsMut<[u16]> + Copy + core::fmt::Debug;
+    type Values: AsRef<[u16]> + AsMut<[u16]> + for<'a> TryFrom<&'a [u16]> + Copy + core::fmt::Debug;
 
     /// The setting that carries the first value; the others follow it without a gap.
     const FIRST: SettingKey;

@@ -19,15 +19,21 @@
 //! limits that it does not know. A board that was told and has not restarted since is told again
 //! while it moves.
 //!
-//! It is pure. It stands apart from the other settings because it is one thing in many packets, and
-//! no request changes it while the robot runs.
+//! A request may have a part told otherwise, to try it on the robot ([`Profiles::describe`]). That
+//! ends with this bridge: a successor tells what is configured.
+//!
+//! It is pure. It stands apart from the other settings because it is one thing in many packets.
 
 use core::time::Duration;
 
 use heapless::Vec as List;
-use lager_topics::{Health, ProfileState};
+use lager_sample::hash;
+use lager_topics::{Ask, Health, Part, ProfileState};
 use lager_wire::link::Up;
-use lager_wire::{Callsign, Profile, RobotProfile, Setting, SettingReply, SettingStatus, Version};
+use lager_wire::{
+    ArmProfile, Callsign, Profile, RobotProfile, SensorProfile, Setting, SettingReply,
+    SettingStatus, SteeringProfile, Version,
+};
 
 use crate::arbiter::Gate;
 use crate::settings::{RETRY, TRIES};
@@ -38,39 +44,6 @@ const PAUSE: Duration = Duration::from_secs(5);
 /// More than the longest profile has values.
 const MOST: usize = 32;
 
-/// A part of the robot's description.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Motors, wheels and battery: the steering board's.
-    Steering,
-    /// Line sensors and IR ranger: the sensor board's.
-    Sensors,
-    /// The arm: the steering board's.
-    Arm,
-}
-
-impl Part {
-    /// All parts. Of one board's, the one that it hears first comes first.
-    pub const ALL: [Self; 3] = [Self::Steering, Self::Sensors, Self::Arm];
-
-    /// The board that is told.
-    pub const fn board(self) -> Callsign {
-        match self {
-            Self::Steering | Self::Arm => Callsign::Steering,
-            Self::Sensors => Callsign::Sensor,
-        }
-    }
-
-    /// The sections of the configuration that say it.
-    pub const fn sections(self) -> &'static str {
-        match self {
-            Self::Steering => "[wheels] and [battery]",
-            Self::Sensors => "[line] and [distance]",
-            Self::Arm => "[arm]",
-        }
-    }
-}
-
 /// How far each part has got.
 pub type States = [(Part, ProfileState); 3];
 
@@ -78,28 +51,51 @@ pub type States = [(Part, ProfileState); 3];
 #[derive(Clone, Debug)]
 pub struct Profiles {
     tellers: [ProfileTeller; 3],
+    /// A hash of everything that is told.
+    told: u32,
 }
 
 impl Profiles {
     /// Sends `robot`, which its owner has validated, to every board that comes up. An earlier
-    /// bridge, if there was one, has told the same.
+    /// bridge, if there was one, may have told the same.
     pub fn new(robot: &RobotProfile, kept: Option<&Health>) -> Self {
-        let told = |state: Option<ProfileState>| state == Some(ProfileState::Accepted);
-        let [steering, sensors, arm] = match kept {
-            Some(kept) => [
-                told(kept.steering_profile.get()),
-                told(kept.sensor_profile.get()),
-                told(kept.arm_profile.get()),
-            ],
-            None => [false; 3],
-        };
-        Self {
-            tellers: [
-                ProfileTeller::new(&robot.steering, steering),
-                ProfileTeller::new(&robot.sensors, sensors),
-                ProfileTeller::new(&robot.arm, arm),
-            ],
+        let tellers = [
+            ProfileTeller::new(&robot.steering),
+            ProfileTeller::new(&robot.sensors),
+            ProfileTeller::new(&robot.arm),
+        ];
+        let told = hash_of(&tellers);
+        let mut profiles = Self { tellers, told };
+        if let Some(kept) = kept.filter(|kept| kept.description == told) {
+            let states = [kept.steering_profile, kept.sensor_profile, kept.arm_profile];
+            for (teller, state) in profiles.tellers.iter_mut().zip(states) {
+                teller.is_known = state == ProfileState::Accepted;
+            }
         }
+        profiles
+    }
+
+    /// Has the board of a part told what a request says instead of what was told before. Returns
+    /// whether a board can obey that.
+    pub fn describe(&mut self, now: Duration, part: Part, ask: &Ask, version: Version) -> bool {
+        let teller = match part {
+            Part::Steering => ask
+                .told::<SteeringProfile>()
+                .as_ref()
+                .map(ProfileTeller::new),
+            Part::Sensors => ask.told::<SensorProfile>().as_ref().map(ProfileTeller::new),
+            Part::Arm => ask.told::<ArmProfile>().as_ref().map(ProfileTeller::new),
+        };
+        let Some(mut teller) = teller else {
+            return false;
+        };
+        let told = &mut self.tellers[part as usize];
+        // An answer to what was told before is on its way perhaps, and counts for nothing.
+        teller.seq = told.seq;
+        teller.board_up(now, version, true);
+        *told = teller;
+        self.told = hash_of(&self.tellers);
+        true
     }
 
     /// A board has come up and gets everything.
@@ -149,6 +145,11 @@ impl Profiles {
         tellers.any(|teller| teller.answer(now, reply))
     }
 
+    /// How far a part has got.
+    pub fn state(&self, part: Part) -> ProfileState {
+        self.tellers[part as usize].state()
+    }
+
     /// How far each part has got.
     pub fn states(&self) -> States {
         let [steering, sensors, arm] = self.tellers.each_ref().map(ProfileTeller::state);
@@ -180,11 +181,22 @@ impl Profiles {
         health.steering_profile = steering.into();
         health.sensor_profile = sensors.into();
         health.arm_profile = arm.into();
+        health.description = self.told;
     }
 
     fn parts(&mut self) -> impl Iterator<Item = (Part, &mut ProfileTeller)> {
         Part::ALL.into_iter().zip(&mut self.tellers)
     }
+}
+
+/// A hash of all settings. It is folded, because half of one tells two descriptions apart as well.
+fn hash_of(tellers: &[ProfileTeller; 3]) -> u32 {
+    let settings = tellers.iter().flat_map(|teller| &teller.settings);
+    let hash = settings.fold(hash::START, |hash, Setting { key, value, .. }| {
+        let [low, high] = value.to_le_bytes();
+        hash::bytes(hash, &[key.code(), low, high])
+    });
+    (hash ^ hash >> u32::BITS) as u32
 }
 
 /// One profile and how much of it the board has taken.
@@ -203,13 +215,12 @@ pub struct ProfileTeller {
 }
 
 impl ProfileTeller {
-    /// Sends `profile`, which its owner has validated, to every board that comes up. `is_known`: the
-    /// board has it from an earlier bridge.
-    pub fn new(profile: &impl Profile, is_known: bool) -> Self {
+    /// Sends `profile`, which its owner has validated, to every board that comes up.
+    pub fn new<P: Profile>(profile: &P) -> Self {
         Self {
             settings: profile.settings().collect(),
             state: ProfileState::NoBoard,
-            is_known,
+            is_known: false,
             taken: 0,
             seq: 0,
             tries: 0,
@@ -313,7 +324,7 @@ impl ProfileTeller {
 
 #[cfg(test)]
 mod tests {
-    use lager_wire::{ArmProfile, ResetCause, SettingKey};
+    use lager_wire::{ResetCause, SettingKey};
 
     use super::*;
 
@@ -331,7 +342,7 @@ mod tests {
     }
 
     fn up() -> ProfileTeller {
-        let mut teller = ProfileTeller::new(&ArmProfile::default(), false);
+        let mut teller = ProfileTeller::new(&ArmProfile::default());
         assert_eq!(teller.poll(ms(0)), None, "nobody is there");
         teller.board_up(ms(0), Version::One, true);
         teller
@@ -504,6 +515,67 @@ mod tests {
             profiles.board_down(Callsign::Steering);
             profiles.board_up(ms(0), &board(Callsign::Steering, false));
             assert_eq!(profiles.wheels(), Gate::Held, "it may be another board");
+        }
+    }
+
+    /// A robot with its motors swapped.
+    fn swapped() -> RobotProfile {
+        let mut robot = RobotProfile::default();
+        robot.steering.wheels.swapped = true;
+        robot
+    }
+
+    #[test]
+    fn what_is_tried_is_told_as_a_whole_and_the_wheels_stand_meanwhile() {
+        let mut profiles = Profiles::new(&RobotProfile::default(), None);
+        profiles.board_up(ms(0), &board(Callsign::Steering, true));
+        obey(&mut profiles, Callsign::Steering);
+        let before = profiles.told;
+
+        let ask = Ask::describe(Part::Steering, &swapped());
+        let mut cut = ask;
+        cut.described -= 1;
+        let mut wild = ask;
+        wild.values[3] = 1;
+        for wrong in [cut, wild, Ask::default()] {
+            assert!(!profiles.describe(ms(0), Part::Steering, &wrong, Version::One));
+        }
+        assert_eq!((profiles.told, profiles.wheels()), (before, Gate::Open));
+
+        assert!(profiles.describe(ms(0), Part::Steering, &ask, Version::One));
+        assert_eq!(
+            (profiles.wheels(), profiles.arm()),
+            (Gate::Held, Gate::Open)
+        );
+        let told = obey(&mut profiles, Callsign::Steering);
+        assert_eq!(
+            told.iter().map(|setting| setting.value).collect::<Vec<_>>(),
+            swapped()
+                .steering
+                .settings()
+                .map(|told| told.value)
+                .collect::<Vec<_>>()
+        );
+        assert_eq!(profiles.state(Part::Steering), ProfileState::Accepted);
+        assert_eq!(profiles.wheels(), Gate::Open);
+        assert_ne!(profiles.told, before);
+    }
+
+    #[test]
+    fn a_successor_that_tells_otherwise_does_not_trust_what_the_board_knows() {
+        let robot = RobotProfile::default();
+        let mut profiles = Profiles::new(&robot, None);
+        profiles.board_up(ms(0), &board(Callsign::Steering, true));
+        obey(&mut profiles, Callsign::Steering);
+        let ask = Ask::describe(Part::Steering, &swapped());
+        assert!(profiles.describe(ms(0), Part::Steering, &ask, Version::One));
+        obey(&mut profiles, Callsign::Steering);
+        let mut kept = Health::default();
+        profiles.fill(&mut kept);
+        for (configured, gate) in [(robot, Gate::Held), (swapped(), Gate::Open)] {
+            let mut successor = Profiles::new(&configured, Some(&kept));
+            successor.board_up(ms(0), &board(Callsign::Steering, false));
+            assert_eq!(successor.wheels(), gate);
         }
     }
 

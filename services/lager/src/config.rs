@@ -87,9 +87,9 @@ section! {
         /// $XDG_STATE_HOME/lager, else ~/.local/state/lager.
         pub state: Option<PathBuf> = None,
         /// The file that describes how this robot is built, as it goes from machine to machine: the
-        /// sections [wheels], [line], [distance], [battery] and [arm]. Unset, real boards have
-        /// robot.toml in their robot's state folder, if there is one. A section stands in one of
-        /// the two files.
+        /// sections [wheels], [line], [distance], [battery], [arm], [logic] and [buttons]. Unset,
+        /// real boards have robot.toml in their robot's state folder, if there is one. A section
+        /// stands in one of the two files.
         pub robot: Option<PathBuf> = None,
         pub log: LogSection = LogSection::default(),
         pub bus: BusSection = BusSection::default(),

@@ -230,7 +230,10 @@ payload! {
         pub sensor_profile: Tag<ProfileState>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 7],
+        pub reserved: [u8; 3],
+        /// A hash of everything that the boards are told of their robot, by which a successor knows
+        /// whether they were told the same.
+        pub description: u32,
     }
 }
 

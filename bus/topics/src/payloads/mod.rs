@@ -32,7 +32,7 @@ pub use nav::{
 };
 pub use pose::Pose;
 pub use request::{
-    Ask, AskKind, BridgeAnswer, Outcome, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,
+    Ask, AskKind, BridgeAnswer, Outcome, Part, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,
 };
 pub use said::word;
 pub use sensor::{DistanceFrame, LineFrame};

@@ -6,8 +6,12 @@ use core::fmt;
 
 use lager_orders::{Mode, Reason};
 use lager_sample::{Tag, coded, payload};
+use lager_wire::{Callsign, Profile, RobotProfile};
 
 use super::said;
+
+/// More values than describe a part of a robot.
+const MOST_VALUES: usize = 40;
 
 coded! {
     /// What the client asks for.
@@ -23,6 +27,43 @@ coded! {
         /// Let logic drive from the start. Answered `Done`, but without effect, if somebody has set
         /// the mode since the robot was switched on.
         Begin = 4,
+        /// Tell a board how `part` of the robot is built, to try it: until this bridge ends, and its
+        /// successor tells what is configured. Answered when the board has taken `values` or not.
+        Describe = 5,
+    }
+}
+
+coded! {
+    /// A part of the robot's description, which one board is told as a whole.
+    pub enum Part {
+        /// Motors, wheels and battery: the steering board's.
+        Steering = 0,
+        /// Line sensors and IR ranger: the sensor board's.
+        Sensors = 1,
+        /// The arm: the steering board's.
+        Arm = 2,
+    }
+}
+
+impl Part {
+    /// All parts. Of one board's, the one that it hears first comes first.
+    pub const ALL: [Self; 3] = [Self::Steering, Self::Sensors, Self::Arm];
+
+    /// The board that is told.
+    pub const fn board(self) -> Callsign {
+        match self {
+            Self::Steering | Self::Arm => Callsign::Steering,
+            Self::Sensors => Callsign::Sensor,
+        }
+    }
+
+    /// The sections of the configuration that say it.
+    pub const fn sections(self) -> &'static str {
+        match self {
+            Self::Steering => "[wheels] and [battery]",
+            Self::Sensors => "[line] and [distance]",
+            Self::Arm => "[arm]",
+        }
     }
 }
 
@@ -57,7 +98,7 @@ impl fmt::Display for Outcome {
 
 payload! {
     /// A request to the bridge.
-    pub struct Ask: 24 bytes {
+    pub struct Ask: 112 bytes {
         /// When the client asked, in ns of `CLOCK_MONOTONIC`.
         pub issued_ns: u64,
         /// How long after that it may be answered, in ms: as long as the client waits.
@@ -72,10 +113,48 @@ payload! {
         pub gain_d: u8,
         /// The word of the stop to release; 0 = unknown. The bridge releases no other stop.
         pub stop_word: u64,
+        /// The part of the robot that is described.
+        pub part: Tag<Part>,
+        /// How many values describe it.
+        pub described: u8,
+        /// What the board is told of it, value by value; the rest is 0.
+        #[serde(with = "lager_sample::list")]
+        pub values: [u16; MOST_VALUES] = [0; MOST_VALUES],
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 6],
     }
 }
 
 impl Ask {
+    /// The request to try how a part of `robot` is built.
+    pub fn describe(part: Part, robot: &RobotProfile) -> Self {
+        let mut ask = Self {
+            kind: AskKind::Describe.into(),
+            part: part.into(),
+            ..Self::default()
+        };
+        match part {
+            Part::Steering => ask.tell(&robot.steering),
+            Part::Sensors => ask.tell(&robot.sensors),
+            Part::Arm => ask.tell(&robot.arm),
+        }
+        ask
+    }
+
+    fn tell(&mut self, profile: &impl Profile) {
+        for (value, told) in self.values.iter_mut().zip(profile.told().as_ref()) {
+            *value = *told;
+            self.described += 1;
+        }
+    }
+
+    /// The profile that it describes; `None` if no board could obey it.
+    pub fn told<P: Profile>(&self) -> Option<P> {
+        let values = self.values.get(..self.described.into())?;
+        P::obeyed(&P::Values::try_from(values).ok()?)
+    }
+
     /// Whether its time is over at `now_ns`: its client has given up, or did not say when it asked.
     pub fn is_over(&self, now_ns: u64) -> bool {
         is_over(self.issued_ns, self.lifetime_ms, now_ns)

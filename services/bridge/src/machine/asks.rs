@@ -7,7 +7,7 @@ use core::time::Duration;
 
 use lager_orders::lease::LATEST_MOVE_NS;
 use lager_orders::{Mode, Moment};
-use lager_topics::{Ask, AskKind, BridgeAnswer, Outcome};
+use lager_topics::{Ask, AskKind, BridgeAnswer, Outcome, ProfileState};
 use lager_wire::{Callsign, Command, SettingKey, Version, WheelCommand};
 
 use super::effect::Notice;
@@ -63,16 +63,44 @@ impl BridgeCore {
             (Some(AskKind::Calibrate), _) if self.is_under_way() => Answered(Outcome::UnderWay),
             // "Done" means that it has begun; `link/health` reports its end.
             (Some(AskKind::Calibrate), _) => self.set(now.robot, &[SettingKey::Calibrate], &[1]),
+            (Some(AskKind::Describe), _) => self.describe(now.robot, ask),
             (Some(AskKind::SetMode), None) | (None, _) => Answered(Outcome::Refused),
         });
     }
 
+    /// Has a board told how its part of the robot is built, unless the robot moves.
+    fn describe(&mut self, now: Duration, ask: &Ask) -> Asked {
+        let Some(part) = ask.part.get() else {
+            return Asked::Answered(Outcome::Refused);
+        };
+        if self.is_under_way() {
+            return Asked::Answered(Outcome::UnderWay);
+        }
+        let version = match self.boards.version(part.board()) {
+            None => return Asked::Answered(Outcome::NoBoard),
+            // An original board knows no settings.
+            Some(Version::Original) => return Asked::Answered(Outcome::Refused),
+            Some(version) => version,
+        };
+        let before = self.profiles.states();
+        if self.may_move() || !self.profiles.describe(now, part, ask, version) {
+            return Asked::Answered(Outcome::Refused);
+        }
+        self.heed_profiles(before);
+        self.due.health = true;
+        Asked::Describing(part)
+    }
+
     /// Whether logic drives the robot now.
     fn is_under_way(&self) -> bool {
+        self.may_move() && self.arbiter.mode() == Mode::Autonomous
+    }
+
+    /// Whether wheels or arm move by an order in force.
+    fn may_move(&self) -> bool {
         let standby = Command::Wheel(WheelCommand::Standby);
         let mut running = self.arbiter.current().into_iter();
-        let drives = running.any(|(_, command)| command != standby);
-        drives && self.arbiter.mode() == Mode::Autonomous && !self.arbiter.is_stopped()
+        running.any(|(_, command)| command != standby) && !self.arbiter.is_stopped()
     }
 
     /// The answer, once it is known and its content is in force.
@@ -133,6 +161,14 @@ impl BridgeCore {
 
     /// Checks whether a board has sent the answer for which a request waits.
     pub(super) fn hear_answer(&mut self, now: Duration) {
+        if let Some(Asked::Describing(part)) = self.asked {
+            self.asked = Some(Asked::Answered(match self.profiles.state(part) {
+                ProfileState::Telling => return,
+                ProfileState::Accepted => Outcome::Done,
+                ProfileState::Refused => Outcome::Refused,
+                ProfileState::NoBoard | ProfileState::Unanswered => Outcome::NoBoard,
+            }));
+        }
         let Some(Asked::Setting { keys, until }) = self.asked else {
             return;
         };

@@ -4,12 +4,11 @@
 
 use lager_orders::Mode;
 use lager_stop::Stop;
-use lager_topics::{AskKind, ProfileState, StopCause, ThoughtKind};
+use lager_topics::{AskKind, Part, ProfileState, StopCause, ThoughtKind};
 use lager_wire::{Callsign, PACKET_LENGTH, SteerCommand};
 
 use crate::arbiter::OrderKey;
 use crate::events::BoardUp;
-use crate::profile::Part;
 
 /// One thing to do.
 #[derive(Clone, Copy, Debug)]

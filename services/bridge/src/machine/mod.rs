@@ -43,7 +43,7 @@ use heapless::Deque;
 use lager_orders::lease::SETPOINT;
 use lager_orders::{Mode, Moment};
 use lager_stop::Stop;
-use lager_topics::{Health, Outcome, Refusal, SteeringOrder, SteeringReport, StopCause};
+use lager_topics::{Health, Outcome, Part, Refusal, SteeringOrder, SteeringReport, StopCause};
 use lager_wire::link::HostTransmitter;
 use lager_wire::{
     Callsign, Command, PACKET_LENGTH, Payload, RobotProfile, Setting, SettingKey, SteerData,
@@ -139,6 +139,8 @@ enum Asked {
         keys: &'static [SettingKey],
         until: Duration,
     },
+    /// A board is told this part of the description.
+    Describing(Part),
 }
 
 /// The progress of a shutdown.

@@ -3,7 +3,8 @@
 use lager_orders::Mode;
 use lager_stop::Stop;
 use lager_topics::{
-    Ask, AskKind, Origin, Outcome, ProfileState, Role, SteeringOrder, SteeringReport, StopCause,
+    Ask, AskKind, Origin, Outcome, Part, ProfileState, Role, SteeringOrder, SteeringReport,
+    StopCause,
 };
 use lager_wire::link::Up;
 use lager_wire::{
@@ -12,8 +13,8 @@ use lager_wire::{
 };
 
 use super::*;
+use crate::arbiter::Gate;
 use crate::events::{BoardUp, PortEvent};
-use crate::profile::Part;
 
 const STEERING: usize = 1;
 
@@ -484,6 +485,44 @@ fn a_report_grows_old_where_none_follows() {
     };
     assert_eq!(age(1_002), (0, 1));
     assert_eq!(age(1_301), (0, 300));
+}
+
+#[test]
+fn a_description_is_tried_only_while_the_robot_stands() {
+    let mut tried = options().robot;
+    tried.steering.wheels.swapped = true;
+    let ask = |core: &mut BridgeCore, millis: u64| {
+        let ask = Ask {
+            issued_ns: at(millis).ns,
+            lifetime_ms: 500,
+            ..Ask::describe(Part::Steering, &tried)
+        };
+        core.ask(at(millis), &ask);
+        turn(core, millis);
+        core.answer().and_then(|answer| answer.outcome.get())
+    };
+    let mut core = core();
+    sensor_up(&mut core, 1_001);
+    let order = SteeringOrder {
+        id: 1,
+        origin: Origin::Operator.into(),
+        code: Command::Wheel(FOLLOW).code(),
+        ..SteeringOrder::default()
+    };
+    let now = at(1_002);
+    assert!(
+        core.order(now.robot, now.robot, Duration::ZERO, &order)
+            .is_some()
+    );
+    turn(&mut core, 1_002);
+    assert_eq!(ask(&mut core, 1_003), Some(Outcome::Refused));
+    assert_eq!(core.profiles.wheels(), Gate::Open, "it goes on as it was");
+
+    let long_after = 1_300;
+    report(&mut core, long_after, IDLE);
+    turn(&mut core, long_after);
+    assert_eq!(ask(&mut core, long_after), None, "the board has to answer");
+    assert_eq!(core.profiles.wheels(), Gate::Held);
 }
 
 #[test]

@@ -3,12 +3,11 @@
 //! It is apart because the sentences are for people, and tell them what to do.
 
 use lager_ports::Cause;
-use lager_topics::{Misfit, ProfileState, Role, Thought, ThoughtKind};
+use lager_topics::{Misfit, Part, ProfileState, Role, Thought, ThoughtKind};
 
 use super::Service;
 use crate::events::BoardUp;
 use crate::machine::Notice;
-use crate::profile::Part;
 
 impl Service<'_> {
     pub(super) fn say(&mut self, news: &Notice) {

@@ -1,7 +1,7 @@
 //! The way of an order: bus, arbiter, packet, board, and back as a report.
 
 use lager_orders::Mode;
-use lager_topics::{Ask, AskKind, Calibration, Finish, Health, Outcome, Role};
+use lager_topics::{Ask, AskKind, Calibration, Finish, Health, Outcome, Part, ProfileState, Role};
 use lager_wire::{ArmCommand, BUILD, Command, LineReading, LineState, SettingStatus};
 
 use crate::harness::{FORWARD, Robot, STANDBY, SensorBoard, SteeringBoard, operator, wait_until};
@@ -179,6 +179,42 @@ fn a_calibration_is_answered_by_the_sensor_board_or_given_up() {
         assert_eq!(i16::from(after.calibrated_sensors), sensors);
     }
     robot.sensor.with(|board| board.deaf = true);
+    assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::NoBoard));
+}
+
+#[test]
+fn a_description_is_tried_on_a_robot_that_stands() {
+    let mut robot = Robot::up();
+    let mut tried = robot.bridge_config.robot;
+    tried.arm.torque_limit = 600;
+    let ask = Ask::describe(Part::Arm, &tried);
+    let in_force = |robot: &Robot| robot.steering.with(|board| board.profile);
+
+    let before = robot.hands.health.look().unwrap().description;
+    let answer = robot.hands.ask(ask);
+    assert_eq!(answer.outcome.get(), Some(Outcome::Done));
+    assert_eq!(in_force(&robot), tried.arm.values());
+    robot.hands.wait_for_health("it is told", |health| {
+        health.description != before && health.arm_profile == ProfileState::Accepted
+    });
+    let mut wild = ask;
+    wild.values[0] = u16::MAX;
+    assert_eq!(robot.hands.ask(wild).outcome.get(), Some(Outcome::Refused));
+    assert_eq!(in_force(&robot), tried.arm.values());
+
+    // A board that restarts is told what is tried.
+    robot
+        .steering
+        .with(|board| board.restart(lager_wire::ResetCause::External));
+    robot.hands.wait_for_health("it is told again", |health| {
+        health.steering.reboots == 1 && health.arm_profile == ProfileState::Accepted
+    });
+    assert_eq!(in_force(&robot), tried.arm.values());
+
+    robot.steering.unplug();
+    robot
+        .hands
+        .wait_for_health("the board is gone", |health| health.steering.up == 0);
     assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::NoBoard));
 }
 

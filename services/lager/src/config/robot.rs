@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   robot = FILE of the configuration, else of real boards robot.toml in the robot's state folder
-//!     [wheels] [line] [distance] [battery] [arm]   each section as in the configuration
+//!     [wheels] [line] [distance] [battery] [arm] [logic] [buttons]   as in the configuration
 //! ```
 //!
 //! It stands apart from the configuration because that is of a machine: ports, addresses, rights.
@@ -14,6 +14,7 @@
 //! description in it.
 
 use std::fmt::Write as _;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
@@ -23,7 +24,7 @@ use lager_wire::{ArmProfile, IrModel, LineProfile, RangerProfile, WheelsProfile}
 use serde::{Deserialize, Serialize};
 
 use super::invalid;
-use super::{BatterySection, Body, Config};
+use super::{BatterySection, Body, ButtonsSection, Config, LogicSection};
 
 /// The sections of the file; those that it leaves out are as the configuration has them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -34,7 +35,14 @@ struct RobotFile {
     distance: Option<RangerProfile>,
     battery: Option<BatterySection>,
     arm: Option<ArmProfile>,
+    logic: Option<LogicSection>,
+    buttons: Option<ButtonsSection>,
 }
+
+/// The names of these sections, in the order of printing.
+const SECTIONS: [&str; 7] = [
+    "wheels", "line", "distance", "battery", "arm", "logic", "buttons",
+];
 
 impl Config {
     /// Takes over the description of the robot from its file, if there is one.
@@ -54,13 +62,82 @@ impl Config {
                 invalid::why(&text, &error)
             )
         })?;
-        take(&mut self.wheels, file.wheels, "wheels", &path)?;
-        take(&mut self.line, file.line, "line", &path)?;
-        take(&mut self.distance, file.distance, "distance", &path)?;
-        take(&mut self.battery, file.battery, "battery", &path)?;
-        take(&mut self.arm, file.arm, "arm", &path)?;
+        self.take(file, &path)?;
         self.validate()
             .with_context(|| format!("the robot's description {}", path.display()))
+    }
+
+    /// Takes the file's sections over.
+    fn take(&mut self, file: RobotFile, path: &Path) -> Result<()> {
+        take(&mut self.wheels, file.wheels, "wheels", path)?;
+        take(&mut self.line, file.line, "line", path)?;
+        take(&mut self.distance, file.distance, "distance", path)?;
+        take(&mut self.battery, file.battery, "battery", path)?;
+        take(&mut self.arm, file.arm, "arm", path)?;
+        take(&mut self.logic, file.logic, "logic", path)?;
+        take(&mut self.buttons, file.buttons, "buttons", path)
+    }
+
+    /// Writes how this robot is built into its file, whose earlier text
+    /// [`Config::forget_description`] brings back. `configured` is what the configuration says
+    /// without that file. Returns the file.
+    ///
+    /// # Errors
+    /// The configuration would contradict the file, or the disk refuses it; then the old text stays.
+    pub fn keep_description(&self, configured: &Self) -> Result<PathBuf> {
+        self.validate()?;
+        let path = self.place_of_description()?;
+        let text = self.described();
+        let file = toml::from_str(&text).context("this is a fault of the program")?;
+        configured.clone().take(file, &path)?;
+        let write = || format!("cannot write the robot's description {}", path.display());
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).with_context(write)?;
+        }
+        let before = match path.exists() {
+            true => files::read(&path).with_context(write)?,
+            false => String::new(),
+        };
+        files::replace(&before_of(&path), &before).with_context(write)?;
+        files::replace(&path, &text).with_context(write)?;
+        Ok(path)
+    }
+
+    /// Puts back the description before the last [`Config::keep_description`]. Doing it twice
+    /// changes nothing. Returns the file.
+    ///
+    /// # Errors
+    /// No description was kept before, or the disk refuses it.
+    pub fn forget_description(&self) -> Result<PathBuf> {
+        let path = self.place_of_description()?;
+        let kept = before_of(&path);
+        if !kept.exists() {
+            bail!(
+                "{} was not written by `lager commission`, so there is nothing to go back to",
+                path.display()
+            );
+        }
+        let write = || format!("cannot go back to {}", kept.display());
+        let before = files::read(&kept).with_context(write)?;
+        match before.is_empty() {
+            true if !path.exists() => {}
+            true => fs::remove_file(&path).with_context(write)?,
+            false => files::replace(&path, &before).with_context(write)?,
+        }
+        Ok(path)
+    }
+
+    /// Where the description of this robot is, or would be.
+    fn place_of_description(&self) -> Result<PathBuf> {
+        match (&self.robot, self.body) {
+            (Some(named), _) => Ok(named.clone()),
+            (None, Body::Serial) => {
+                Ok(StateFolder::of_robot(&self.state_root()?, &self.name).robot())
+            }
+            (None, Body::Sim | Body::Chip) => bail!(
+                "a robot without boards has no description of its own; name a file for it (robot = \"FILE\" in the configuration)"
+            ),
+        }
     }
 
     /// The file that describes this robot, if there is one.
@@ -75,19 +152,18 @@ impl Config {
         if self.body != Body::Serial {
             return Ok(None);
         }
-        let kept = StateFolder::of_robot(&self.state_root()?, &self.name).robot();
+        let kept = self.place_of_description()?;
         Ok(kept.exists().then_some(kept))
     }
 
     /// The description alone, as a file for another machine.
     pub fn described(&self) -> String {
-        let sections = ["wheels", "line", "distance", "battery", "arm"];
         let documented = self.documented();
         let mut text = String::new();
         for block in documented.split("\n\n") {
             let head = block.lines().find_map(|line| line.strip_prefix('['));
             let name = head.and_then(|head| head.split([']', '.']).next());
-            if name.is_some_and(|name| sections.contains(&name)) {
+            if name.is_some_and(|name| SECTIONS.contains(&name)) {
                 // Writing to a String cannot fail.
                 let _ = writeln!(text, "{}\n", block.trim());
             }
@@ -127,6 +203,11 @@ impl Config {
             false => differs.join(", "),
         }
     }
+}
+
+/// Where the text stands that a description had before it was written.
+fn before_of(path: &Path) -> PathBuf {
+    path.with_added_extension("before")
 }
 
 /// Takes a section over, unless the configuration says something else.
@@ -212,6 +293,15 @@ mod tests {
                 squeeze_load: 250,
                 ..ArmProfile::default()
             },
+            logic: LogicSection {
+                cruise_mm_per_s: 60.5,
+                ..LogicSection::default()
+            },
+            buttons: ButtonsSection {
+                chip: Some("/dev/gpiochip0".into()),
+                switch: Some(6),
+                ..ButtonsSection::default()
+            },
             ..Config::default()
         }
     }
@@ -221,9 +311,13 @@ mod tests {
         let text = other().described();
         let there = described(&text, Config::default()).expect("valid");
         assert_eq!(there.robot(), other().robot(), "{text}");
+        assert_eq!(
+            (&there.logic, &there.buttons),
+            (&other().logic, &other().buttons)
+        );
         let same = described(&text, other()).expect("both say the same");
         assert_eq!(same.robot(), other().robot());
-        for strange in ["[serial]", "name =", "[logic]", "secret"] {
+        for strange in ["[serial]", "name =", "[station]", "secret"] {
             assert!(!text.contains(strange), "{text}");
         }
         assert_eq!(
@@ -274,6 +368,59 @@ mod tests {
             "{said}"
         );
         assert!(said.contains("take it out of one"), "{said}");
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_can_be_taken_back() {
+        let folder = Folder::new("keep");
+        let place = folder.0.join("robots/table.toml");
+        let configured = Config {
+            robot: Some(place.clone()),
+            ..Config::default()
+        };
+        let told = configured.forget_description().expect_err("nothing");
+        assert!(told.to_string().contains("nothing to go back"), "{told}");
+        let read = || {
+            let mut config = configured.clone();
+            config.describe().map(|()| config.wheels.full_turn_ms)
+        };
+        for turn in [9_000, 9_500] {
+            let mut new = configured.clone();
+            new.wheels.full_turn_ms = turn;
+            assert_eq!(new.keep_description(&configured).expect("kept"), place);
+            assert_eq!(read().expect("valid"), turn);
+        }
+        for _ in 0..2 {
+            configured.forget_description().expect("there is one");
+            assert_eq!(read().expect("valid"), 9_000);
+        }
+
+        let contradicts = Config {
+            wheels: WheelsProfile {
+                duty: 90,
+                ..WheelsProfile::default()
+            },
+            ..configured.clone()
+        };
+        let told = configured.keep_description(&contradicts).expect_err("two");
+        assert!(told.to_string().contains("take it out of one"), "{told}");
+        assert_eq!(read().expect("as before"), 9_000);
+
+        let simulated = Config::default();
+        let told = simulated.keep_description(&simulated).expect_err("no file");
+        assert!(told.to_string().contains("robot = \"FILE\""), "{told}");
+    }
+
+    #[test]
+    fn the_first_description_leaves_none_when_it_is_taken_back() {
+        let folder = Folder::new("first");
+        let configured = Config {
+            robot: Some(folder.0.join("robot.toml")),
+            ..Config::default()
+        };
+        let path = configured.keep_description(&configured).expect("kept");
+        configured.forget_description().expect("taken back");
+        assert!(!path.exists());
     }
 
     #[test]
