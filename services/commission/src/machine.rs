@@ -16,7 +16,9 @@ use core::time::Duration;
 
 use lager_operator::{Driving, For, Ids, Seen};
 use lager_orders::{Mode, Moment, Reason};
-use lager_topics::{Calibration, Health, ProfileState, SteeringOrder, SteeringReport};
+use lager_topics::{
+    Calibration, Health, Outcome, Part, ProfileState, SteeringOrder, SteeringReport,
+};
 use lager_wire::{
     BUILD, Centimetres, FULL_TURNS_MS, LineBits, OperatorCommand, RobotProfile, Speed, Version,
 };
@@ -34,8 +36,8 @@ const PULSE: Duration = Duration::from_millis(500);
 const BEGIN: Duration = Duration::from_secs(1);
 /// How long the boards may take to obey a description.
 const TELL: Duration = Duration::from_secs(5);
-/// A description that was given just now shows in `link/health` after this time at the latest.
-const SHOWN: Duration = Duration::from_millis(300);
+/// A description that was refused is told again after this time: the wheels may just have stopped.
+const RETRY: Duration = Duration::from_millis(200);
 /// How long a calibration may take; the board watches its sensors for 5 s.
 const CALIBRATE: Duration = Duration::from_secs(8);
 /// The longest movement that waits for an answer.
@@ -49,6 +51,9 @@ const LENGTHS_CM: [f32; 2] = [30.0, 300.0];
 /// Possible speeds, in mm/s.
 const SPEEDS_MM_PER_S: [f32; 2] = [10.0, 1_000.0];
 
+/// The parts of the description that are found out.
+const TOLD: [Part; 2] = [Part::Steering, Part::Sensors];
+
 /// How a robot is built, as far as commissioning finds it out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Built {
@@ -61,8 +66,9 @@ pub struct Built {
 /// Something that the caller must do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Effect {
-    /// Let the boards obey this description.
-    Describe(RobotProfile),
+    /// Ask the bridge to have this part told as the robot's, and hand its answer in
+    /// ([`Commissioning::described`]).
+    Describe(Part, RobotProfile),
     /// Publish an order to the wheels.
     Steer(SteeringOrder),
     /// Let the sensor board calibrate its line sensors.
@@ -75,8 +81,11 @@ pub enum Effect {
 enum State {
     /// Waits for an answer.
     Asks,
-    /// The boards are told a description.
-    Tells { since: Duration },
+    /// The boards are told a description; the next request is due at a time, or under way.
+    Tells {
+        since: Duration,
+        due: Option<Duration>,
+    },
     /// The sensor board watches its line sensors.
     Calibrates { since: Duration, ended_before: u8 },
     /// The wheels turn, until a time after their beginning or until the next answer.
@@ -107,8 +116,16 @@ pub struct Commissioning {
     built: Built,
     /// What held before each step.
     before: [Built; Step::ALL.len()],
-    /// What the boards were told last.
-    told: RobotProfile,
+    /// What held before all of them.
+    original: Built,
+    /// What the boards shall obey.
+    wanted: RobotProfile,
+    /// What they obey of it; `None` if nobody knows.
+    told: [Option<RobotProfile>; TOLD.len()],
+    /// The hash of it in `link/health`, once that has come.
+    description: Option<u32>,
+    /// The person ends it, and the boards are told what they were told before.
+    is_leaving: bool,
     found: Found,
     health: Option<(Duration, Health)>,
     /// The lives of both links since the step began.
@@ -132,7 +149,11 @@ impl Commissioning {
             step: Step::Boards,
             built,
             before: [built; Step::ALL.len()],
-            told: built.robot,
+            original: built,
+            wanted: built.robot,
+            told: [None; TOLD.len()],
+            description: None,
+            is_leaving: false,
             found: Found::default(),
             health: None,
             epochs: None,
@@ -252,33 +273,57 @@ impl Commissioning {
         self.driving.refused(now.robot, health);
         let epochs = [health.sensor.epoch, health.steering.epoch];
         let up = [health.sensor.up, health.steering.up];
-        if self.step == Step::Boards {
+        if self.step == Step::Boards || self.state == State::Over {
             return;
         }
-        if up.contains(&0) || self.epochs.is_some_and(|before| before != epochs) {
+        let is_told_otherwise = self.description.is_some_and(|told| told != health.description);
+        if is_told_otherwise {
+            self.told = [None; TOLD.len()];
+        }
+        let has_changed = self.epochs.is_some_and(|before| before != epochs);
+        if up.contains(&0) || has_changed || is_told_otherwise {
             return self.to_boards(now, "board_changed");
         }
         self.epochs = Some(epochs);
-        match self.state {
-            State::Tells { since } if now.robot >= since + SHOWN && is_obeyed(health) => {
-                // Of what came meanwhile nobody knows by which description it was made.
-                self.bits.clear();
-                self.readings.clear();
-                self.volts.clear();
-                self.state = State::Asks;
-            }
-            State::Calibrates { ended_before, .. }
-                if health.calibrations_ended != ended_before =>
-            {
-                match (health.calibration_failure(), line::dull(health)) {
-                    (None, _) => self.ask(Question::LineFloor),
-                    (Some(_), Some(dull)) if health.calibration == Calibration::Partly => {
-                        self.fail(now, dull);
-                    }
-                    (Some(why), _) => self.fail(now, why),
+        if !matches!(self.state, State::Tells { .. }) {
+            self.description = Some(health.description);
+        }
+        if let State::Calibrates { ended_before, .. } = self.state
+            && health.calibrations_ended != ended_before
+        {
+            match (health.calibration_failure(), line::dull(health)) {
+                (None, _) => self.ask(Question::LineFloor),
+                (Some(_), Some(dull)) if health.calibration == Calibration::Partly => {
+                    self.fail(now, dull);
                 }
+                (Some(why), _) => self.fail(now, why),
             }
-            _ => {}
+        }
+    }
+
+    /// To be called with the bridge's answer to [`Effect::Describe`]; `None` if there was none.
+    pub fn described(&mut self, now: Moment, part: Part, outcome: Option<Outcome>) {
+        let State::Tells { since, .. } = self.state else {
+            return;
+        };
+        let place = part as usize;
+        let is_told = outcome == Some(Outcome::Done);
+        if is_told && let Some(told) = self.told.get_mut(place) {
+            *told = Some(self.wanted);
+        }
+        let pause = if is_told { Duration::ZERO } else { RETRY };
+        self.state = State::Tells {
+            since,
+            due: Some(now.robot + pause),
+        };
+    }
+
+    /// To be called with the bridge's answer to [`Effect::Calibrate`]; `None` if there was none.
+    pub fn calibrates(&mut self, now: Moment, outcome: Option<Outcome>) {
+        match outcome {
+            Some(Outcome::Done) => {}
+            Some(why) => self.fail(now, Reason::from(why)),
+            None => self.fail(now, "bridge_silent"),
         }
     }
 
@@ -319,12 +364,16 @@ impl Commissioning {
             return self.fail(now, why);
         }
         let is_busy = !matches!(self.state, State::Asks | State::Over);
-        if is_busy && self.known(now.robot).is_none() {
+        if is_busy && !self.is_leaving && self.known(now.robot).is_none() {
             return self.to_boards(now, "bridge_silent");
         }
         let past = |since: Duration, span| now.robot >= since + span;
         match self.state {
-            State::Tells { since } if past(since, TELL) => self.to_boards(now, "undescribed"),
+            State::Tells { since, .. } if past(since, TELL) => self.undescribed(now),
+            State::Tells {
+                since,
+                due: Some(due),
+            } if due <= now.robot => self.tell_next(since),
             State::Calibrates { since, .. } if past(since, CALIBRATE) => {
                 self.fail(now, Reason::from(lager_orders::Code::CalibrationSilent));
             }
@@ -387,9 +436,13 @@ impl Commissioning {
     /// Ends it: the robot stands, and the boards obey what they obeyed before.
     pub fn quit(&mut self, now: Moment) {
         self.stand(now);
-        self.built = self.before[0];
-        self.tell(now, self.built.robot);
+        self.built = self.original;
+        self.is_leaving = true;
         self.state = State::Over;
+        // Without a first answer nothing was tried.
+        if self.told != [None; TOLD.len()] {
+            self.tell(now, self.built.robot);
+        }
     }
 
     fn answered(&mut self, now: Moment, answer: Answer) -> Result<(), Said> {
@@ -401,11 +454,11 @@ impl Commissioning {
             }
             (Question::LineSway, Answer::Yes) => {
                 let health = self.known(now.robot).ok_or("bridge_silent")?;
-                self.effects.push(Effect::Calibrate);
                 self.state = State::Calibrates {
                     since: now.robot,
                     ended_before: health.calibrations_ended,
                 };
+                self.effects.push(Effect::Calibrate);
             }
             (Question::LineFloor, Answer::Yes) => {
                 self.found.floor = self.bits.mode(now.robot).ok_or_else(silent)?;
@@ -593,6 +646,10 @@ impl Commissioning {
         self.found = Found::default();
         self.epochs = None;
         self.built = self.before[step as usize];
+        self.ask(step.first());
+        if step == Step::Boards {
+            return;
+        }
         let mut trial = self.built.robot;
         match step {
             Step::Distance => trial.sensors.ranger = MEASURING,
@@ -600,16 +657,47 @@ impl Commissioning {
             Step::Battery => trial.steering.divider = true,
             _ => {}
         }
-        self.ask(step.first());
         self.tell(now, trial);
     }
 
-    /// Lets the boards obey a description, if they do not yet.
+    /// Lets the boards obey a description.
     fn tell(&mut self, now: Moment, robot: RobotProfile) {
-        if robot != self.told {
-            self.told = robot;
-            self.effects.push(Effect::Describe(robot));
-            self.state = State::Tells { since: now.robot };
+        self.wanted = robot;
+        self.description = None;
+        self.state = State::Tells {
+            since: now.robot,
+            due: Some(now.robot),
+        };
+        self.tell_next(now.robot);
+    }
+
+    /// Tells the next part that a board does not obey yet.
+    fn tell_next(&mut self, since: Duration) {
+        let is_open = |part: &Part| match (part, self.told[*part as usize]) {
+            (_, None) => true,
+            (Part::Steering, Some(told)) => told.steering != self.wanted.steering,
+            (_, Some(told)) => told.sensors != self.wanted.sensors,
+        };
+        if let Some(part) = TOLD.into_iter().find(is_open) {
+            self.effects.push(Effect::Describe(part, self.wanted));
+            self.state = State::Tells { since, due: None };
+            return;
+        }
+        // Of what came before nobody knows by which description it was made.
+        self.bits.clear();
+        self.readings.clear();
+        self.volts.clear();
+        self.state = if self.is_leaving { State::Over } else { State::Asks };
+    }
+
+    /// A board does not take a description.
+    fn undescribed(&mut self, now: Moment) {
+        self.told = [None; TOLD.len()];
+        if self.is_leaving {
+            self.said.push("undescribed".into());
+            self.state = State::Over;
+        } else {
+            self.to_boards(now, "undescribed");
         }
     }
 
@@ -621,11 +709,11 @@ impl Commissioning {
 
     /// A board has gone, or nobody knows how it is: the person looks at the boards first.
     fn to_boards(&mut self, now: Moment, why: &'static str) {
-        self.fail(now, why);
-        let built = self.built;
+        self.stand(now);
+        self.said.push(Said::of("ended", [("why", why.into())]));
+        self.built = self.before[self.step as usize];
+        self.before[Step::Boards as usize] = self.built;
         self.step = Step::Boards;
-        self.before[Step::Boards as usize] = self.before[0];
-        self.before[Step::Line as usize] = built;
         self.ask(Question::Boards);
     }
 

@@ -62,7 +62,12 @@ pub(crate) fn sensor(far: Point, near: Point) -> Result<RangerProfile, Said> {
         };
         let curve = Curve::new(&profile);
         let wrong = |(cm, reading): Point| {
+            // Where even a much weaker reading is the nearest distance, nothing is told apart.
+            let weaker = curve.distance(reading - reading / 4);
             let told = f32::from(curve.distance(reading).get()?);
+            if weaker.0 == curve.least_cm() {
+                return None;
+            }
             Some((told / f32::from(cm)).max(f32::from(cm) / told))
         };
         let (far, near) = (wrong(far)?, wrong(near)?);

@@ -12,7 +12,7 @@ use super::Whole;
 use crate::config::{BatterySection, Config};
 
 /// Virtual time in which a mission must be over.
-const LIMIT: Duration = Duration::from_secs(600);
+pub(super) const LIMIT: Duration = Duration::from_secs(600);
 
 /// What a person who knows the robot writes into its description.
 fn described(build: &Build) -> Config {
@@ -44,7 +44,7 @@ fn described(build: &Build) -> Config {
     config
 }
 
-fn robot(config: &Config, build: Build, seed: u64) -> Whole {
+pub(super) fn robot(config: &Config, build: Build, seed: u64) -> Whole {
     let warehouse = Warehouse::builtin("small").expect("built in");
     let options = RobotOptions {
         seed,
@@ -54,7 +54,7 @@ fn robot(config: &Config, build: Build, seed: u64) -> Whole {
     Whole::of(config, &warehouse, &[1], options).expect("a robot")
 }
 
-fn seeds() -> std::ops::RangeInclusive<u64> {
+pub(super) fn seeds() -> std::ops::RangeInclusive<u64> {
     let seeds = std::env::var("LAGER_SEEDS").map_or(20, |seeds| seeds.parse().expect("a number"));
     1..=seeds
 }
