@@ -3,6 +3,10 @@
 //! Each step rests on those before it: the line is followed by sensors that are known, and times are
 //! taken when the motors are known and the battery does not change the speed.
 
+use lager_orders::Language;
+
+use crate::words::Said;
+
 /// What is found out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
@@ -96,8 +100,12 @@ pub enum Question {
 }
 
 impl Question {
-    /// Its sentence.
-    pub const fn sentence(self) -> &'static str {
+    /// What is asked, in this language.
+    pub fn text(self, language: Language) -> String {
+        Said::from(self.sentence()).text(language)
+    }
+
+    const fn sentence(self) -> &'static str {
         match self {
             Self::Boards => "ask_boards",
             Self::LineSway => "ask_line_sway",

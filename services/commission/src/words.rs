@@ -53,6 +53,15 @@ impl Said {
         }
     }
 
+    /// The name of the sentence that says why, if it is one of this crate's table.
+    pub fn cause(&self) -> &'static str {
+        let inner = match self {
+            Self::Here { values, .. } => values.iter().find(|(key, _)| *key == "why"),
+            Self::Order(_) | Self::Plain(_) => None,
+        };
+        inner.map_or(self.name(), |(_, why)| why.cause())
+    }
+
     /// The sentence in this language.
     pub fn text(&self, language: Language) -> String {
         let (name, values) = match self {

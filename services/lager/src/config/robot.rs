@@ -151,7 +151,7 @@ impl Config {
     }
 
     /// Where the description of this robot is, or would be.
-    fn place_of_description(&self) -> Result<PathBuf> {
+    pub fn place_of_description(&self) -> Result<PathBuf> {
         match (&self.robot, self.body) {
             (Some(named), _) => Ok(named.clone()),
             (None, Body::Serial) => {
