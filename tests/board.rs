@@ -8,6 +8,7 @@ use std::process::{Child, Command, Output, Stdio};
 
 use lager_loader::{Header, Image, crc_step};
 use lager_pty::Port;
+use lager_rig::behind_ports;
 use lager_tests::{Domain, Running, in_tree, wait_for};
 use lager_topics::{Health, LinkHealth, StopCause};
 use lager_wire::{BUILD, ResetCause};
@@ -49,11 +50,8 @@ impl Boards {
             .expect("the emulator starts");
         let config = at("lager.toml");
         // The boards say who they are: the names of the ports are the wrong way round.
-        let text = format!(
-            "body = \"serial\"\n[serial]\nsensor = {steering:?}\nsteering = {sensor:?}\n\
-             [chip]\nclock = {:?}\n",
-            at("clock")
-        );
+        let ports = behind_ports(&steering, &sensor).expect("a description");
+        let text = format!("{ports}[chip]\nclock = {:?}\n", at("clock"));
         fs::write(&config, text).expect("a file");
         // After power-on a board waits in its bootloader for half a second.
         wait_for("the boards' programs", || {

@@ -6,6 +6,7 @@ use std::time::Duration;
 use lager_home::Clock;
 use lager_orders::Mode;
 use lager_ports::Subscriber;
+use lager_rig::behind_ports;
 use lager_tests::{Cable, Domain, Running, is_stopped, pid, wait_for};
 use lager_topics::{
     Health, Hold, LinkHealth, NavStatus, Origin, Phase, Refusal, SteeringState, TruthPose,
@@ -222,12 +223,8 @@ fn boards_at_a_cable(domain: &Domain) -> (Running, Cable, String) {
     let [sensor, steering, cable] = ["sensor.tty", "steering.tty", "cable.tty"].map(file);
     let write = |name: &str, steering: &std::path::Path| {
         let path = file(name);
-        let serial = format!("[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
-        std::fs::write(
-            &path,
-            format!("body = \"serial\"\nwarehouse = \"small\"\n{serial}"),
-        )
-        .expect("a configuration");
+        let text = behind_ports(&sensor, steering).expect("a description");
+        std::fs::write(&path, format!("warehouse = \"small\"\n{text}")).expect("a configuration");
         path.to_str().expect("a path in UTF-8").to_owned()
     };
     let (boards, config) = (

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use lager_home::Clock;
 use lager_ports::{BusConfig, NodeState, Subscriber};
+use lager_rig::behind_ports;
 use lager_sample::Stamp;
 use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, pid, wait_for};
 use lager_topics::{LinkHealth, NavStatus, TruthPose};
@@ -259,14 +260,9 @@ fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
     // The robot is a process of its own, as real boards are, and survives the supervisor.
     let [sensor, steering] = ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
     let config = domain.folder().join("robot.toml");
-    std::fs::write(
-        &config,
-        format!(
-            "body = \"serial\"\nwarehouse = \"small\"\n\
-             [serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n"
-        ),
-    )
-    .expect("a configuration file");
+    let text = behind_ports(&sensor, &steering).expect("a description");
+    std::fs::write(&config, format!("warehouse = \"small\"\n{text}"))
+        .expect("a configuration file");
     let config = config.to_str().expect("a path in UTF-8");
     let body = domain.start(&["--config", config, "simulator"]);
     let up = ["--config", config, "up", "--script", "--mission", "1"];

@@ -8,6 +8,7 @@ use std::time::Duration;
 use lager_floor::Node;
 use lager_plant::Warehouse;
 use lager_ports::{Bus, Subscriber};
+use lager_rig::behind_ports;
 use lager_stop::{Stop, StopWord};
 use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, wait_for};
 use lager_topics::{LinkHealth, NavMap, NavStatus, Phase, TruthPose};
@@ -28,8 +29,7 @@ impl Scene {
         let port = |name: &str| domain.folder().join(name);
         let [sensor, steering] = ["sensor.tty", "steering.tty"].map(port);
         let config = port("robot.toml");
-        let text =
-            format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
+        let text = behind_ports(&sensor, &steering).expect("a description");
         fs::write(&config, text).expect("a configuration file");
         let config = config.to_str().expect("UTF-8").to_owned();
         let body = domain.start(&["--config", &config, "simulator"]);

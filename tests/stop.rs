@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use lager_home::Clock;
 use lager_ports::{Bus, Subscriber};
+use lager_rig::behind_ports;
 use lager_stop::{StopPage, StopWord};
 use lager_tests::{Domain, Running, has_ended, is_stopped, pid, wait_for};
 use lager_topics::{LinkHealth, Role, SensorLine, TruthPose};
@@ -35,8 +36,7 @@ impl Scene {
         let [sensor, steering] =
             ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
         let config = domain.folder().join("robot.toml");
-        let text =
-            format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
+        let text = behind_ports(&sensor, &steering).expect("a description");
         fs::write(&config, text).expect("a configuration file");
         let body = domain.start(&["--config", config.to_str().expect("UTF-8"), "simulator"]);
         let truth = domain.observe("r1", 1.0).subscriber().expect("a topic");

@@ -9,6 +9,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig};
+use lager_rig::behind_ports;
 use lager_tests::{Cable, Domain, lager, pid, wait_for};
 use lager_topics::{LAGER, Role, TruthPose};
 use rustix::process::{Signal, kill_process};
@@ -82,12 +83,9 @@ impl Boards {
         let file = |name: &str| domain.folder().join(name);
         let [sensor, steering, cable] = ["sensor.tty", "steering.tty", "cable.tty"].map(file);
         let write = |name: &str, steering: &Path| {
-            let serial = format!("[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
-            fs::write(
-                file(name),
-                format!("body = \"serial\"\nwarehouse = \"small\"\n{serial}"),
-            )
-            .expect("a configuration");
+            let text = behind_ports(&sensor, steering).expect("a description");
+            fs::write(file(name), format!("warehouse = \"small\"\n{text}"))
+                .expect("a configuration");
         };
         write("boards.toml", &steering);
         write("robot.toml", &cable);

@@ -6,6 +6,7 @@ use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
 use lager_ports::Subscriber;
+use lager_rig::behind_ports;
 use lager_tests::{Domain, Running, wait_for};
 use lager_topics::{LinkHealth, TruthPose};
 
@@ -100,8 +101,7 @@ impl Scene {
         let [sensor, steering] =
             ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
         let config = domain.folder().join("lager.toml");
-        let text =
-            format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
+        let text = behind_ports(&sensor, &steering).expect("a description");
         fs::write(&config, text).expect("a configuration file");
         let body = domain.start(&["simulator"]);
         let up = domain.start(&["up", "--station", address]);

@@ -239,14 +239,18 @@ impl Page {
         });
     }
 
-    /// Orders goods by the field, anew as long as the page says that what it shows is old.
-    pub(crate) fn order(&mut self, goods: &str) {
-        wait_for("the order to be given", || {
-            self.fill("#goods", goods);
-            self.click("#fetch button");
-            let said = self.text("#missions-said");
-            (!said.contains("what is shown is old")).then_some(())
+    /// Orders goods until an expression of the page is true. What came too late is refused, and so is
+    /// a press on an old picture; then a person orders again.
+    pub(crate) fn order(&mut self, goods: &str, expression: &str) {
+        self.do_until(expression, |page| {
+            page.fill("#goods", goods);
+            page.click("#fetch button");
         });
+    }
+
+    /// Whether the robot fetches these goods, as an expression of the page.
+    pub(crate) fn fetches(goods: &str) -> String {
+        format!("document.querySelector('#order-number').textContent.includes('{goods}')")
     }
 
     /// The middle of the first element that matches, in pixels.
@@ -295,8 +299,13 @@ impl Page {
     /// Clicks until an expression of the page is true. What came too late is refused, and then a
     /// person clicks again.
     pub(crate) fn click_until(&mut self, selector: &str, expression: &str) {
+        self.do_until(expression, |page| page.click(selector));
+    }
+
+    /// Does something again and again, with 5 s after each time, until an expression is true.
+    fn do_until(&mut self, expression: &str, mut act: impl FnMut(&mut Self)) {
         wait_for(expression, || {
-            self.click(selector);
+            act(self);
             for _ in 0..100 {
                 if self.value(expression) == true {
                     return Some(());

@@ -310,7 +310,7 @@ fn a_simulated_robot_is_put_into_the_saved_warehouse_after_a_question_and_stands
     page.wait_for("#queue-said", "Nothing waits.");
     // Goods 9 can be fetched, once a person has released the stop.
     scene.resume();
-    page.order("9");
+    page.order("9", &Page::fetches("9"));
     wait_for("it to fetch goods 9", || {
         (status.latest().expect("readable")?.product == 9).then_some(())
     });

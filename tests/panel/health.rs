@@ -1,10 +1,12 @@
 //! How the robot is, help, the theme, and what a driver sees of keys and of other people.
 
 use lager_tests::{pid, wait_for};
+use lager_topics::LinkHealth;
 use rustix::process::{Signal, kill_process};
 use serde_json::json;
 
 use crate::browser::Page;
+use crate::keyboard::press;
 use crate::played::Stage;
 use crate::scene::Scene;
 
@@ -52,6 +54,49 @@ pub(crate) fn a_killed_service_shows_as_died_and_back_with_its_count(
         !row(page, "bridge").1.contains("again"),
         "the others went on"
     );
+}
+
+pub(crate) fn a_board_is_restarted_while_the_robot_stands_and_not_on_its_way(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    let mut health = scene.bus.subscriber::<LinkHealth>().expect("a topic");
+    let mut reboots = || {
+        wait_for("its health", || {
+            let health = health.latest().expect("readable")?;
+            (health.steering.up != 0).then_some((health.sensor.reboots, health.steering.reboots))
+        })
+    };
+    let before = reboots();
+    scene.wait_to_move();
+    page.open_view("health");
+    let button = |board: &str| format!("#health [data-row=lost-{board}] button");
+    page.wait_until(&format!("document.querySelector('{}')", button("steering")) + " !== null");
+    page.click(&button("steering"));
+    let refused = row_says("lost-steering", "on its way by itself");
+    page.wait_until(&refused);
+    assert_eq!(reboots(), before);
+
+    press(page, "Escape");
+    page.wait_for("#stop-said", "both wheels stand");
+    page.click_until(
+        &button("steering"),
+        &row_says("lost-steering", "restarted 1"),
+    );
+    assert!(!page.value(&refused).as_bool().expect("yes or no"));
+    wait_for("only that board to have restarted", || {
+        (reboots() == (before.0, before.1 + 1)).then_some(())
+    });
+    page.click("#tab-log");
+    page.wait_for("#entries", "restarts the steering board");
+    scene.resume();
+}
+
+/// Whether a row of the Health view has these words, as an expression of the page.
+fn row_says(id: &str, words: &str) -> String {
+    format!(
+        "Boolean(document.querySelector('#health [data-row={id}]')?.textContent.includes('{words}'))"
+    )
 }
 
 #[test]

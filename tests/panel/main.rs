@@ -108,6 +108,7 @@ each_alone! {
     stopping::each_service_that_is_killed_has_its_end_and_its_return_in_the_log,
     stopping::what_is_ordered_in_a_terminal_is_in_the_log_with_who,
     health::a_killed_service_shows_as_died_and_back_with_its_count,
+    health::a_board_is_restarted_while_the_robot_stands_and_not_on_its_way,
     health::help_opens_by_key_and_stop_works_over_it,
     health::the_theme_survives_a_reload_and_is_the_display_s_too,
     health::what_drives_is_shown_as_pressed,
@@ -135,11 +136,9 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     // Puts a thing on the short way to product 2 while the robot fetches product 1.
     page.click_at_mm(0.0, 750.0);
     page.wait_for("#map-said", "obstacle put");
-    page.order("2");
-    wait_for("it to wait or to be under way", || {
-        let shown = page.text("#queue") + &page.text("#order-number");
-        shown.contains('2').then_some(())
-    });
+    let waits_or_is_fetched = "['#queue', '#order-number'].some((at) => \
+                               document.querySelector(at).textContent.includes('2'))";
+    page.order("2", waits_or_is_fetched);
     // Its drawing moves as the robot does.
     let place = "document.querySelector('#map .robot').getAttribute('transform')";
     let before = page.value(place);

@@ -114,8 +114,8 @@ fn goods_that_were_delivered_are_fetched_again_only_when_a_person_says_that_they
     page.wait_until("document.querySelector('#map-words #goods-back') !== null");
     page.click("#goods-back-no");
     page.wait_until("document.querySelector('#goods-back').hidden");
-    page.order("1");
-    page.wait_until("document.querySelector('#missions #goods-back:not([hidden])') !== null");
+    let asks = "document.querySelector('#missions #goods-back:not([hidden])') !== null";
+    page.order("1", asks);
     assert_eq!(orders(&mut page, 1), 0);
     page.click("#goods-back-yes");
     page.wait_for("#order-number", "1");

@@ -44,7 +44,7 @@ fn of_every_view() {
     scene.wait_to_move();
     page.click_at_mm(0.0, 750.0);
     page.wait_for("#map-said", "obstacle put");
-    page.order("2");
+    page.order("2", &Page::fetches("2"));
     view(&mut page, "under-way");
     page.dress("light", 3840, 2160, false);
     take(&mut page, "under-way-4k-light");

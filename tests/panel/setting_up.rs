@@ -163,13 +163,12 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
     let waiting = "[...document.querySelectorAll('#queue .waiting')].map((line) => \
                    line.firstChild.textContent).join()";
     for (product, queue) in [("2", "2"), ("3", "2,3")] {
-        page.order(product);
-        page.wait_until(&format!("{waiting} === '{queue}'"));
+        page.order(product, &format!("{waiting} === '{queue}'"));
     }
     // A product that already has an order cannot get a second; the page shows the reason there.
     for (product, why) in [("1", "the robot fetches it"), ("3", "ordered, as number 2")] {
-        page.order(product);
-        page.wait_for("#missions-said", why);
+        let said = "document.querySelector('#missions-said').textContent";
+        page.order(product, &format!("{said}.includes('{why}')"));
     }
     page.wait_until(&format!("{waiting} === '2,3'"));
     let button = |line: usize, which: usize| {
@@ -212,12 +211,9 @@ fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     assert!(texts(&mut page, "#history li").contains('3'));
 
     // An order can be cancelled as long as its goods are not in the claw.
-    page.order("2");
-    page.wait_for("#order-number", "2");
-    page.click("#order-cancel");
-    page.wait_until("document.querySelector('#order').hidden");
-    page.click("#queue-undo");
-    page.wait_for("#order-number", "2");
+    page.order("2", &Page::fetches("2"));
+    page.click_until("#order-cancel", "document.querySelector('#order').hidden");
+    page.click_until("#queue-undo", &Page::fetches("2"));
     drop(page);
     scene.end();
 }

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use lager_benches::{BenchError, Domain, FAMILY, heed_interrupts, interrupted};
 use lager_ports::{Bus, Client};
+use lager_rig::behind_ports;
 use lager_stop::{Stop, StopPage, StopTold, StopWord};
 use lager_topics::{Ask, AskKind, BridgeRequest, Role};
 use rustix::process::{Pid, Signal, kill_process};
@@ -101,8 +102,7 @@ impl Robot {
         let config = domain.config();
         let place = config.home()?;
         let [sensor, steering] = ["sensor", "steering"].map(|name| place.folder().join(name));
-        let text =
-            format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
+        let text = behind_ports(&sensor, &steering)?;
         let folder = place.folder_of(&config.unit);
         let mut processes = Processes {
             children: Vec::new(),

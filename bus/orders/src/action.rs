@@ -4,7 +4,7 @@
 use core::time::Duration;
 
 use lager_floor::{Place, ProductId};
-use lager_wire::{OperatorArm, OperatorCommand, Speed};
+use lager_wire::{Callsign, OperatorArm, OperatorCommand, Speed};
 
 use crate::lease::{LATEST, LATEST_MOVE};
 use crate::mode::{Mode, Pick};
@@ -78,6 +78,9 @@ pub enum Action {
     },
     /// `calibrate`: calibrate the line sensors, on the tape under the robot (E9).
     Calibrate,
+    /// `restart`: restart a board, [`Callsign::Sensor`] or [`Callsign::Steering`]. The robot has to
+    /// stand.
+    Restart(Callsign),
     /// `horn`: sound the horn.
     Horn,
     /// `obstacle`: put an obstacle on an edge of a simulated world, or take it away (E6).

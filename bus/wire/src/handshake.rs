@@ -45,6 +45,14 @@ coded! {
     }
 }
 
+#[cfg(feature = "lager-sample")]
+lager_sample::coded_as_is!(Callsign {
+    Error,
+    Raspi,
+    Sensor,
+    Steering
+});
+
 /// Its name in sentences and in the names of files.
 impl fmt::Display for Callsign {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -88,8 +88,8 @@ section! {
         pub state: Option<PathBuf> = None,
         /// The file that describes how this robot is built, as it goes from machine to machine: the
         /// sections [wheels], [line], [distance], [battery], [arm], [logic] and [buttons]. Unset,
-        /// real boards have robot.toml in their robot's state folder, if there is one. A section
-        /// stands in one of the two files.
+        /// real boards have robot.toml in their robot's state folder; without it they stand, but for
+        /// driving by hand. A section stands in one of the two files.
         pub robot: Option<PathBuf> = None,
         pub log: LogSection = LogSection::default(),
         pub bus: BusSection = BusSection::default(),
@@ -380,6 +380,7 @@ impl Config {
             reach_elbow: self.logic.reach_elbow,
             pick: self.pick(),
             arm: self.arm,
+            is_described: self.is_described(),
             waiting: self.bus.policy(),
             ..lager_logic::LogicConfig::default()
         }

@@ -265,9 +265,10 @@ fn robot(config: &Config) -> Finding {
     let built = config.built();
     match config.robot_file() {
         Ok(Some(file)) => Good(format!("{built}, says {}", file.display())),
-        Ok(None) if config.body == Body::Serial => Good(format!(
-            "{built}, says the configuration; a robot.toml in the state folder would say more"
-        )),
+        Ok(None) if config.body == Body::Serial => Bad(
+            "nobody has said how this robot is built, so it drives only by hand; `lager commission` asks for it, or `lager config --robot` prints a description to be kept"
+                .into(),
+        ),
         Ok(None) => Good(built),
         Err(error) => Hint(format!("{error:#}")),
     }

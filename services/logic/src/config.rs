@@ -118,6 +118,10 @@ pub struct LogicConfig {
     pub tries: u8,
     /// How often the robot may pass the pick station without finding it.
     pub misses: u8,
+    /// Whether somebody has said how this robot is built. It stands until then, as its motors may be
+    /// swapped. Recordings without it are of robots that were known.
+    #[serde(default = "known")]
+    pub is_described: bool,
     /// How [`crate::run`] waits for samples.
     #[serde(skip)]
     pub waiting: Policy,
@@ -131,6 +135,10 @@ impl LogicConfig {
     pub(crate) fn nearest_turn_mm(&self) -> f32 {
         self.sensor_ahead_mm + self.tape_mm / 2.0
     }
+}
+
+const fn known() -> bool {
+    true
 }
 
 fn usual_duty() -> u8 {
@@ -184,6 +192,7 @@ impl Default for LogicConfig {
             outage: Duration::from_millis(125),
             tries: 8,
             misses: 3,
+            is_described: known(),
             waiting: Policy::Block,
             resume: false,
         }

@@ -17,7 +17,7 @@ use lager_topics::{
     Ask, BridgeAnswer, Event, EventKind, Health, Input, NavigatorStatus, Order, OrderQueue,
     Outcome, Phase, WorldAnswer, WorldAsk, WorldRefusal,
 };
-use lager_wire::OperatorCommand;
+use lager_wire::{Callsign, OperatorCommand};
 
 use crate::ids::Ids;
 use crate::seen::Seen;
@@ -31,6 +31,9 @@ pub(crate) const REPEAT: u64 = 250_000_000;
 const PATIENCE: u64 = 2_500_000_000;
 /// How long a calibration may take, in ms of robot time. The board watches its sensors for 5 s.
 const CALIBRATION_MS: u128 = 8_000;
+/// How long a board may take to be up again, in ms of robot time. It waits half a second in its
+/// bootloader.
+const RESTART_MS: u128 = 5_000;
 
 /// Something that the caller must do on the bus.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,6 +87,8 @@ enum Await {
     Answer,
     /// One more calibration has ended.
     Calibration { ended_before: u8 },
+    /// This board has started once more, and is up.
+    Restart { board: Callsign, before: usize },
     /// The simulated world answers; then logic must hear where the robot stands.
     World,
 }
@@ -93,7 +98,8 @@ struct Waiting<K> {
     whose: K,
     action: Action,
     awaits: Await,
-    /// How many orders were before the one to be moved up, when the move was last given.
+    /// How many orders were before the one to be moved up, when the move was last given; how often
+    /// the board that is to restart had started.
     before: usize,
     /// The press, if there is one; requests use only its id.
     input: Input,
@@ -164,6 +170,11 @@ impl<K: Copy> Orders<K> {
                     let since = now.robot.saturating_sub(one.since.robot);
                     let is_over = since.as_millis() >= CALIBRATION_MS;
                     return is_over.then(|| Err(Code::CalibrationSilent.into()));
+                }
+                Await::Restart { .. } => {
+                    let since = now.robot.saturating_sub(one.since.robot);
+                    let is_over = since.as_millis() >= RESTART_MS;
+                    return is_over.then(|| Err(Outcome::NoBoard.into()));
                 }
                 // The caller limits the time of these.
                 Await::Answer | Await::World => return None,
@@ -270,6 +281,10 @@ impl<K: Copy> Orders<K> {
             Await::Calibration { ended_before } if health.calibrations_ended != ended_before => {
                 Some(health.calibration_failure().map_or(Ok(()), Err))
             }
+            Await::Restart { board, before } => {
+                let shown = health.of(board);
+                (shown.up != 0 && shown.reboots as usize != before).then_some(Ok(()))
+            }
             _ => None,
         });
     }
@@ -290,6 +305,13 @@ impl<K: Copy> Orders<K> {
                 (Some(Outcome::Done), Action::Calibrate) => {
                     one.awaits = Await::Calibration {
                         ended_before: calibrated,
+                    };
+                    None
+                }
+                (Some(Outcome::Done), Action::Restart(board)) => {
+                    one.awaits = Await::Restart {
+                        board,
+                        before: one.before,
                     };
                     None
                 }

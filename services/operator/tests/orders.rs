@@ -9,7 +9,7 @@ use lager_topics::{
     AskKind, BridgeAnswer, Health, InputKind, NavigatorStatus, OrderQueue, Outcome, Phase,
     SteeringReport, WaitingOrder, WorldAnswer,
 };
-use lager_wire::{OperatorCommand, Speed};
+use lager_wire::{Callsign, OperatorCommand, Speed};
 
 /// The moment `ms` ms after the robot was switched on, the same on both clocks.
 fn at(ms: u64) -> Moment {
@@ -157,6 +157,50 @@ fn a_calibration_ends_when_the_board_says_so() {
     assert_eq!(one.end(), None, "it takes its time");
     one.turn(9_001);
     assert_eq!(one.end(), Some(Err("calibration_silent".into())));
+}
+
+#[test]
+fn a_board_has_restarted_when_it_is_up_once_more() {
+    let health = |up: u8, reboots: u32| {
+        let mut health = Health::default();
+        (health.steering.up, health.steering.reboots) = (up, reboots);
+        health.sensor.reboots = 9;
+        health
+    };
+    let given = || {
+        let seen = Seen {
+            health: Some(health(1, 2)),
+            ..seen(&[])
+        };
+        let mut one = Waiting::given(Action::Restart(Callsign::Steering), seen);
+        let [Act::Ask { id, ask }] = one.orders.acts()[..] else {
+            panic!("the bridge is asked");
+        };
+        assert_eq!(
+            (ask.kind.get(), ask.board.get()),
+            (Some(AskKind::Restart), Some(Callsign::Steering))
+        );
+        // The board is quicker than the answer.
+        let quick = Seen {
+            health: Some(health(0, 3)),
+            ..one.seen.clone()
+        };
+        one.orders.answered(id, Ok(BridgeAnswer::default()), &quick);
+        one
+    };
+    let mut one = given();
+    for (up, reboots) in [(1, 2), (0, 2), (0, 3)] {
+        one.orders.health(&health(up, reboots));
+        assert_eq!(one.end(), None);
+    }
+    one.orders.health(&health(1, 3));
+    assert_eq!(one.end(), Some(Ok(())));
+
+    let mut one = given();
+    one.turn(5_900);
+    assert_eq!(one.end(), None, "it takes its time");
+    one.turn(6_001);
+    assert_eq!(one.end(), Some(Err("outcome_no_board".into())));
 }
 
 #[test]

@@ -88,11 +88,16 @@ static WORDS: LazyLock<[String; 2]> = LazyLock::new(|| {
             } else {
                 sentence.english
             };
-            (sentence.name, said)
+            (
+                sentence.name,
+                format!("{}: {},", sentence.name, serde_json::json!(said)),
+            )
         });
-        let sentences = serde_json::json!(sentences.collect::<BTreeMap<_, _>>());
+        // Names beside their like pack better.
+        let sentences: BTreeMap<_, _> = sentences.collect();
+        let sentences = sentences.into_values().collect::<Vec<_>>().concat();
         let words = written(language).unwrap_or_default();
-        format!("{words}export const SENTENCES = {sentences};\n")
+        format!("{words}export const SENTENCES = {{{sentences}}};\n")
     })
 });
 

@@ -484,5 +484,6 @@ fn is_the_drivers(action: Action) -> bool {
             | Action::Place(_)
             | Action::Gains { .. }
             | Action::Calibrate
+            | Action::Restart(_)
     )
 }

@@ -337,7 +337,7 @@ impl Watch {
         let hold = status.hold.get().filter(|hold| match hold {
             Hold::Battery => self.helper == Helper::Nobody,
             Hold::Arm => self.helper == Helper::Nobody && status.pick == Pick::Auto,
-            Hold::None | Hold::Blind | Hold::Unheard | Hold::Link => false,
+            Hold::None | Hold::Blind | Hold::Unheard | Hold::Link | Hold::Undescribed => false,
         });
         if hold.is_none() {
             self.unhelped_since = None;

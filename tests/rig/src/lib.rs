@@ -8,6 +8,7 @@ pub mod allocations;
 mod board;
 pub mod boards;
 mod cable;
+mod described;
 mod domain;
 mod host;
 mod interrupts;
@@ -20,6 +21,7 @@ mod shared;
 
 pub use board::{Board, GAP_US, SPEAK_EVERY_NS, wheels_in_the_air};
 pub use cable::{Cable, timespec};
+pub use described::behind_ports;
 pub use domain::{Domain, NoPlace, bus_at};
 pub use host::Host;
 pub use interrupts::{heed_interrupts, interrupted};

@@ -20,6 +20,8 @@
 //!            | arm <armcomm>           one step of the arm
 //!            | gains <int> <int>       of the error and of its change, each 0 to 255
 //!            | calibrate               the line sensors, on the tape under the robot
+//!            | restart sensor|steering
+//!                                      that board; refused while the robot moves
 //!            | horn                    the robot sounds its horn: it says so in a thought
 //!            | obstacle put <edge>     in a simulated world
 //!            | obstacle take <edge>
@@ -33,7 +35,7 @@ use core::fmt;
 
 use lager_floor::{Place, ProductId};
 use lager_orders::{Action, LeaseMs, Mode, Pick, Put};
-use lager_wire::{OperatorCommand, Speed};
+use lager_wire::{Callsign, OperatorCommand, Speed};
 use thiserror::Error;
 
 use super::fields::Value as _;
@@ -216,6 +218,7 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
             d: reader.word().number("a gain from 0 to 255", 0, 255)?,
         },
         "calibrate" => Action::Calibrate,
+        "restart" => Action::Restart(reader.word().read("sensor or steering", board)?),
         "horn" => Action::Horn,
         "obstacle" => Action::Obstacle {
             put: reader.word().read("put or take", |word| {
@@ -227,12 +230,21 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
         },
         _ => {
             let wanted = "one of order, cancel, first, up, clear, back, mode, resume, reset, place, \
-                          picked, pick, drive, arm, gains, calibrate, horn and obstacle";
+                          picked, pick, drive, arm, gains, calibrate, restart, horn and obstacle";
             return Err(word.misread(wanted).into());
         }
     };
     reader.end()?;
     Ok(action)
+}
+
+/// A board by its name.
+fn board(word: &str) -> Option<Callsign> {
+    match word {
+        "sensor" => Some(Callsign::Sensor),
+        "steering" => Some(Callsign::Steering),
+        _ => None,
+    }
 }
 
 fn read_drive(reader: &mut Reader<'_>) -> Result<Action, Fault> {
@@ -317,6 +329,7 @@ impl fmt::Display for Spelled<'_> {
             Action::Arm(step) => write!(formatter, "arm {}", Code(OperatorCommand::Arm(*step))),
             Action::Gains { p, d } => write!(formatter, "gains {p} {d}"),
             Action::Calibrate => formatter.write_str("calibrate"),
+            Action::Restart(board) => write!(formatter, "restart {board}"),
             Action::Horn => formatter.write_str("horn"),
             Action::Obstacle { put, way } => {
                 write!(formatter, "obstacle {} {}", put.as_str(), Words(way))

@@ -10,7 +10,7 @@ use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
 use lager_lines::{Name, Products, Text, to_line};
 use lager_orders::{Action, LeaseMs, Mode, Pick, Put, Reason, Wheels};
-use lager_wire::{Binary, LineBits, LineReading, OperatorArm, OperatorCommand, Speed};
+use lager_wire::{Binary, Callsign, LineBits, LineReading, OperatorArm, OperatorCommand, Speed};
 use proptest::option::of;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -127,6 +127,7 @@ fn action() -> impl Strategy<Value = Action> {
         arm().prop_map(Action::Arm),
         any::<(u8, u8)>().prop_map(|(p, d)| Action::Gains { p, d }),
         Just(Action::Calibrate),
+        select(&[Callsign::Sensor, Callsign::Steering]).prop_map(Action::Restart),
         Just(Action::Horn),
         of(product_id()).prop_map(|product| Action::Back { product }),
         (select(&[Put::Put, Put::Take]), way())

@@ -133,6 +133,10 @@ impl Ask {
                 ..kind(AskKind::SetGains)
             },
             Action::Calibrate => kind(AskKind::Calibrate),
+            Action::Restart(board) => Self {
+                board: board.into(),
+                ..kind(AskKind::Restart)
+            },
             _ => return None,
         })
     }

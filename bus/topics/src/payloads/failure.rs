@@ -125,6 +125,8 @@ coded! {
         Calibrate = 13,
         /// A person puts goods back in their place and says so.
         PutBack = 14,
+        /// Somebody commissions the robot: says how it is built.
+        Describe = 15,
     }
 }
 

@@ -4,7 +4,7 @@ use core::fmt;
 
 use lager_orders::{Code, Mode, Reason};
 use lager_sample::{Tag, coded, payload};
-use lager_wire::{BUILD, ResetCause, Version};
+use lager_wire::{BUILD, Callsign, ResetCause, Version};
 
 use super::steering::{Finish, Origin, Refusal};
 use super::stop::StopCause;
@@ -240,6 +240,14 @@ payload! {
 impl Health {
     /// `gain_p` and `gain_d` before a request has set them. 0 is a valid gain.
     pub const NEVER_SET: i16 = -1;
+
+    /// The link of a board, [`Callsign::Sensor`] or [`Callsign::Steering`].
+    pub const fn of(&self, board: Callsign) -> &BoardHealth {
+        match board {
+            Callsign::Sensor => &self.sensor,
+            _ => &self.steering,
+        }
+    }
 
     /// Whether both boards are up, and nobody is telling them how their robot is built.
     pub fn boards_are_ready(&self) -> bool {

@@ -71,6 +71,8 @@ coded! {
         Battery = 4,
         /// The external computer is out of reach, and the robot must then stand.
         Link = 5,
+        /// Nobody has said how this robot is built, so nobody knows which way it would drive.
+        Undescribed = 6,
     }
 }
 
@@ -84,6 +86,7 @@ impl Hold {
             Self::Arm => Remedy::Arm,
             Self::Battery => Remedy::Charge,
             Self::Link => Remedy::Link,
+            Self::Undescribed => Remedy::Describe,
         }
     }
 }

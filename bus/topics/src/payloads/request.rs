@@ -30,6 +30,9 @@ coded! {
         /// Tell a board how `part` of the robot is built, to try it: until this bridge ends, and its
         /// successor tells what is configured. Answered when the board has taken `values` or not.
         Describe = 5,
+        /// Restart `board`, while the robot stands. "Done" means that it was told to; `link/health`
+        /// shows when it is up again.
+        Restart = 6,
     }
 }
 
@@ -120,9 +123,11 @@ payload! {
         /// What the board is told of it, value by value; the rest is 0.
         #[serde(with = "lager_sample::list")]
         pub values: [u16; MOST_VALUES] = [0; MOST_VALUES],
+        /// The board to restart.
+        pub board: Tag<Callsign>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 6],
+        pub reserved: [u8; 5],
     }
 }
 

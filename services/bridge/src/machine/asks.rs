@@ -63,9 +63,30 @@ impl BridgeCore {
             (Some(AskKind::Calibrate), _) if self.is_under_way() => Answered(Outcome::UnderWay),
             // "Done" means that it has begun; `link/health` reports its end.
             (Some(AskKind::Calibrate), _) => self.set(now.robot, &[SettingKey::Calibrate], &[1]),
+            (Some(AskKind::Restart), _) => Answered(self.restart(ask)),
             (Some(AskKind::Describe), _) => self.describe(now.robot, ask),
             (Some(AskKind::SetMode), None) | (None, _) => Answered(Outcome::Refused),
         });
+    }
+
+    /// Tells a board to restart, unless the robot moves.
+    fn restart(&mut self, ask: &Ask) -> Outcome {
+        let boards = [Callsign::Sensor, Callsign::Steering];
+        let Some(board) = ask.board.get().filter(|board| boards.contains(board)) else {
+            return Outcome::Refused;
+        };
+        if self.is_under_way() {
+            return Outcome::UnderWay;
+        }
+        match (self.boards.version(board), self.boards.place(board)) {
+            (Some(Version::One), Some(place)) if !self.may_move() => {
+                self.due.restart[place] = true;
+                Outcome::Done
+            }
+            // An original board knows no such order.
+            (Some(_), _) => Outcome::Refused,
+            (None, _) => Outcome::NoBoard,
+        }
     }
 
     /// Has a board told how its part of the robot is built, unless the robot moves.

@@ -46,8 +46,8 @@ use lager_stop::Stop;
 use lager_topics::{Health, Outcome, Part, Refusal, SteeringOrder, SteeringReport, StopCause};
 use lager_wire::link::HostTransmitter;
 use lager_wire::{
-    Callsign, Command, PACKET_LENGTH, Payload, RobotProfile, Setting, SettingKey, SteerData,
-    Version,
+    Callsign, Command, PACKET_LENGTH, Payload, ResetOrder, RobotProfile, Setting, SettingKey,
+    SteerData, Version,
 };
 
 pub use effect::{Effect, Notice, ShownReport, Write};
@@ -158,6 +158,8 @@ struct Due {
     /// A stop has come: write its standby before everything else.
     halt: bool,
     handshake: [Option<Handshake>; 2],
+    /// The board at this port is told to restart.
+    restart: [bool; 2],
     release: Option<Stop>,
     stop: Option<StopCause>,
     shown: Option<ShownReport>,
@@ -453,6 +455,18 @@ impl BridgeCore {
                     Handshake::Syn => transmitter.syn(),
                     Handshake::Ack(version) => transmitter.ack(version),
                 };
+                return Some(Effect::Write(Write {
+                    place,
+                    packet,
+                    command: None,
+                    order: None,
+                }));
+            }
+        }
+        if let Some(place) = self.due.restart.iter().position(|restart| *restart) {
+            self.due.restart[place] = false;
+            let restart = Payload::Reset(ResetOrder::Restart);
+            if let Some(packet) = self.transmitters[place].encode(restart) {
                 return Some(Effect::Write(Write {
                     place,
                     packet,

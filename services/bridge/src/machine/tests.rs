@@ -8,7 +8,7 @@ use lager_topics::{
 };
 use lager_wire::link::Up;
 use lager_wire::{
-    Callsign, Command, Profile as _, ResetCause, RobotProfile, SettingReply, SettingStatus,
+    Callsign, Command, Packet, Profile as _, ResetCause, RobotProfile, SettingReply, SettingStatus,
     SteerData, SteerFlags, Version, WheelCommand,
 };
 
@@ -485,6 +485,52 @@ fn a_report_grows_old_where_none_follows() {
     };
     assert_eq!(age(1_002), (0, 1));
     assert_eq!(age(1_301), (0, 300));
+}
+
+#[test]
+fn a_board_is_told_to_restart_once_and_only_while_the_robot_stands() {
+    let mut core = core();
+    let ask = |core: &mut BridgeCore, millis: u64, board: Callsign| {
+        let ask = Ask {
+            issued_ns: at(millis).ns,
+            lifetime_ms: 500,
+            board: board.into(),
+            kind: AskKind::Restart.into(),
+            ..Ask::default()
+        };
+        core.ask(at(millis), &ask);
+        let mut restarts = 0;
+        while let Some(effect) = core.next(at(millis)) {
+            if let Effect::Write(write) = effect {
+                let packet = Packet::decode(&write.packet, Version::One).expect("a packet");
+                restarts += usize::from(packet.payload == Payload::Reset(ResetOrder::Restart));
+                assert_eq!(write.place, STEERING);
+            }
+        }
+        let outcome = core.answer().and_then(|answer| answer.outcome.get());
+        (outcome, restarts)
+    };
+    let stands = (Some(Outcome::Done), 1);
+    assert_eq!(ask(&mut core, 1_002, Callsign::Steering), stands);
+    let absent = (Some(Outcome::NoBoard), 0);
+    assert_eq!(ask(&mut core, 1_002, Callsign::Sensor), absent);
+    let refused = (Some(Outcome::Refused), 0);
+    assert_eq!(ask(&mut core, 1_002, Callsign::Raspi), refused);
+
+    sensor_up(&mut core, 1_003);
+    let order = SteeringOrder {
+        id: 1,
+        origin: Origin::Operator.into(),
+        code: Command::Wheel(FOLLOW).code(),
+        ..SteeringOrder::default()
+    };
+    let now = at(1_004);
+    assert!(
+        core.order(now.robot, now.robot, Duration::ZERO, &order)
+            .is_some()
+    );
+    turn(&mut core, 1_004);
+    assert_eq!(ask(&mut core, 1_005, Callsign::Steering), refused);
 }
 
 #[test]

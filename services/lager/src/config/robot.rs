@@ -7,6 +7,9 @@
 //! ```
 //!
 //! It stands apart from the configuration because that is of a machine: ports, addresses, rights.
+//! Real boards without such a file stand until there is one, because nobody knows which way they
+//! would drive; it may be empty.
+//!
 //! A section may stand in one of the two files. If both say something else, nobody knows which one
 //! is right, and the robot does not start.
 //!
@@ -48,6 +51,11 @@ const SECTIONS: [&str; 7] = [
 ];
 
 impl Config {
+    /// Whether somebody has said how this robot is built. A simulated one is built as it is.
+    pub fn is_described(&self) -> bool {
+        self.robot.is_some() || self.body != Body::Serial
+    }
+
     /// Takes over the description of the robot from its file, if there is one.
     ///
     /// # Errors
@@ -67,7 +75,9 @@ impl Config {
         })?;
         self.take(file, &path)?;
         self.validate()
-            .with_context(|| format!("the robot's description {}", path.display()))
+            .with_context(|| format!("the robot's description {}", path.display()))?;
+        self.robot = Some(path);
+        Ok(())
     }
 
     /// Takes the file's sections over.
@@ -455,6 +465,7 @@ mod tests {
             ..Config::default()
         };
         config.describe().expect("there is none");
+        assert!(!config.is_described(), "real boards stand");
         std::fs::create_dir(folder.0.join("r1")).expect("a folder");
         let file = folder.0.join("r1/robot.toml");
         std::fs::write(&file, "[wheels]\nswapped = true\n").expect("a file");
@@ -466,5 +477,6 @@ mod tests {
         config.describe().expect("valid");
         simulated.describe().expect("not read");
         assert!(config.wheels.swapped && !simulated.wheels.swapped);
+        assert!(config.is_described() && simulated.is_described());
     }
 }

@@ -364,6 +364,8 @@ impl Navigator {
     fn hold(&self) -> Hold {
         if self.holding.unheard {
             Hold::Unheard
+        } else if !self.config.is_described {
+            Hold::Undescribed
         } else if self.mission.is_kept() && self.mission.battery.forbids() {
             Hold::Battery
         } else if self.mission.is_kept() {

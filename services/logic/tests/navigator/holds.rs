@@ -89,6 +89,20 @@ fn a_silent_steering_board_lets_nothing_move_whatever_it_was_doing() {
 }
 
 #[test]
+fn a_robot_that_nobody_has_described_stands_and_says_so_until_a_successor_knows_it() {
+    for mut trial in [mission(), run_to(Phase::Driving)] {
+        trial.config.is_described = false;
+        trial.kill(SECOND);
+        assert_stands(&mut trial, SECOND * 10);
+        assert_eq!(hold(&trial), Some(Hold::Undescribed), "{}", trial.story());
+        assert_eq!(trial.status.remedy, Remedy::Describe);
+        trial.config.is_described = true;
+        trial.kill(SECOND);
+        trial.deliver(1);
+    }
+}
+
+#[test]
 fn a_mission_survives_a_silence_of_the_steering_board_at_any_moment() {
     let silences = [90, 190, 230, 350, 800, 1_500].map(Duration::from_millis);
     let mut trial = mission();

@@ -91,7 +91,7 @@ fn is_news(before: &NavigatorStatus, after: &NavigatorStatus) -> bool {
 /// One robot with its navigator, and what has happened so far.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
-    config: LogicConfig,
+    pub(crate) config: LogicConfig,
     pub(crate) published: WarehouseMap,
     pub(crate) body: Body,
     pub(crate) navigator: Navigator,

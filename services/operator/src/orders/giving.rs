@@ -68,6 +68,10 @@ impl<K: Copy> Orders<K> {
                 return Err(seen.newer_stop(stop));
             }
             Action::Calibrate => seen.may_be_calibrated()?,
+            Action::Restart(board) => {
+                let health = seen.health.unwrap_or_default();
+                before = health.of(board).reboots as usize;
+            }
             _ => {}
         }
         let id = self.ids.fresh(now.ns);

@@ -8,9 +8,10 @@ import { chain, isOld, losses, machine, services, versions } from "./model.js";
 import { age } from "../bar/face.js";
 import { MARKS } from "../parts/marks.js";
 import { make, set } from "../parts/svg.js";
+import { reason } from "../words/sentences.js";
 import { put, say } from "../words/words.js";
 
-/** @typedef {{ item: HTMLLIElement, shape: SVGSVGElement, path: SVGPathElement, name: HTMLElement, value: HTMLElement, said: HTMLElement }} Drawn a row as it is drawn */
+/** @typedef {{ item: HTMLLIElement, shape: SVGSVGElement, path: SVGPathElement, name: HTMLElement, value: HTMLElement, said: HTMLElement, button: HTMLButtonElement | null }} Drawn a row as it is drawn */
 
 export class Health {
   /**
@@ -27,6 +28,14 @@ export class Health {
      * @type {Map<HTMLElement, Map<string, Drawn>>}
      */
     this.rows = new Map();
+    /** @type {Robot | null} */
+    this.robot = null;
+    /**
+     * Why a board was not restarted, beside its row.
+     *
+     * @type {{ robot: Robot, row: string, said: string } | null}
+     */
+    this.refused = null;
   }
 
   /**
@@ -38,15 +47,29 @@ export class Health {
   draw(robot, now) {
     const { parts, link } = this;
     if (document.body.dataset.view !== "health") return;
+    this.robot = robot;
     this.list(parts.links, chain(link, robot, now));
     const told = robot?.health ? robot : null;
     const isStale = told !== null && isOld(told, now);
     parts.body.classList.toggle("old", isStale);
     put(parts.said, told ? (isStale ? say("health_as_of", age(now - told.healthAt)) : "") : say("health_untold"));
     this.list(parts.services, told ? services(told) : []);
-    this.list(parts.losses, told ? losses(told) : []);
+    const { refused } = this;
+    this.list(parts.losses, (told ? losses(told) : []).map((row) => (refused?.robot === told && refused?.row === row.id ? { ...row, said: refused.said } : row)));
     this.list(parts.machine, told ? machine(told) : []);
     this.list(parts.versions, versions(link, robot));
+  }
+
+  /**
+   * Has a board restarted.
+   *
+   * @param {Row} row
+   */
+  async restart({ id, board }) {
+    const { robot, link } = this;
+    if (!robot) return;
+    const { refused } = await link.act(robot, `restart ${board}`);
+    this.refused = refused ? { robot, row: id, said: reason(refused) } : null;
   }
 
   /**
@@ -65,7 +88,7 @@ export class Health {
       known.delete(id);
     }
     rows.forEach((row, place) => {
-      const drawn = known.get(row.id) ?? newRow(row.id);
+      const drawn = known.get(row.id) ?? newRow(row.id, row.board ? () => this.restart(row) : null);
       known.set(row.id, drawn);
       if (list.children[place] !== drawn.item) list.insertBefore(drawn.item, list.children[place] ?? null);
       fill(drawn, row);
@@ -75,15 +98,18 @@ export class Health {
 
 /**
  * @param {string} id
+ * @param {(() => void) | null} press what its button does, if it has one
  * @returns {Drawn}
  */
-function newRow(id) {
+function newRow(id, press) {
   const item = document.createElement("li");
   item.dataset.row = id;
   const shape = make("svg", { viewBox: "0 0 20 20", role: "img" }, item);
   const [name, value, said] = [document.createElement("strong"), document.createElement("span"), document.createElement("p")];
-  item.append(name, value, said);
-  return { item, shape, path: make("path", {}, shape), name, value, said };
+  const button = press && document.createElement("button");
+  item.append(name, value, said, ...(button ? [button] : []));
+  if (button) [button.type, button.onclick] = ["button", press];
+  return { item, shape, path: make("path", {}, shape), name, value, said, button };
 }
 
 /**
@@ -97,4 +123,5 @@ function fill(drawn, { mark, name, value, said }) {
   put(drawn.name, name);
   put(drawn.value, value);
   put(drawn.said, said ?? "");
+  if (drawn.button) put(drawn.button, say("restart_board", name));
 }

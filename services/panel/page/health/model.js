@@ -9,8 +9,8 @@ import { say } from "../words/words.js";
 
 /**
  * @typedef {"good" | "bad" | "unknown"} Mark
- * @typedef {{ id: string, mark: Mark, name: string, value: string, said?: string }} Row a subject, its value, and where it
- *   is not good what is wrong and what helps
+ * @typedef {{ id: string, mark: Mark, name: string, value: string, said?: string, board?: string }} Row a subject, its
+ *   value, where it is not good what is wrong and what helps, and the board that can be restarted there
  */
 
 /** Later than this a health is old, in ms; a robot tells it once a second. */
@@ -113,7 +113,7 @@ export function losses({ state, health }) {
   const boards = BOARDS.map(([board]) => {
     const [lost, damaged, restarts] = [state[`${board}_lost`], health?.[`${board}_damaged`], health?.[`${board}_restarts`]];
     const value = lost === undefined ? say("unheard") : say("health_lost", lost, damaged ?? "\u2013", restarts ?? "\u2013");
-    return { id: `lost-${board}`, mark: lost === undefined ? "unknown" : "good", name: say(`board_${board}`), value };
+    return { id: `lost-${board}`, mark: lost === undefined ? "unknown" : "good", name: say(`board_${board}`), value, board };
   });
   return [...boards, { id: "lost-bus", mark: state.bus_lost === undefined ? "unknown" : "good", name: say("health_between"), value: say("health_missed", state.bus_lost ?? "\u2013") }];
 }

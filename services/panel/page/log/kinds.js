@@ -30,7 +30,7 @@ const OF_EVENT = {
 /** @type {Partial<Record<string, Kind>>} */
 const OF_WISH = {
   stop: "stop", resume: "stop", order: "goods", cancel: "goods", first: "goods", up: "goods", clear: "goods", back: "goods", picked: "goods",
-  obstacle: "ways", gains: "settings", calibrate: "settings", pick: "settings", warehouse: "settings",
+  obstacle: "ways", gains: "settings", calibrate: "settings", restart: "settings", pick: "settings", warehouse: "settings",
 };
 /**
  * How the kinds of thoughts begin; all others are of the way.
@@ -115,6 +115,7 @@ function asked([name = "", what = "", first = "", ...more]) {
     drive: () => "",
     arm: () => "",
     obstacle: () => crossing(more.slice(0, 2).join()),
+    restart: () => say(`board_${first}`),
     place: () => [crossing(`${first},${more[0]}`), sentence(`looks_${more[1]}`)].join(" "),
   };
   // What takes no words is called as its button is.

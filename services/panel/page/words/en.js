@@ -38,7 +38,7 @@ export const WORDS = {
   by_comm: "the station", by_operator: "a command in a terminal",
   did_stop: "{0} stops it", did_resume: "{0} releases the stop", did_mode: "{0} makes it {1}", did_take: "{0} takes the wheel", did_free: "{0} leaves the wheel", did_order: "{0} orders {1}", did_cancel: "{0} cancels order {1}",
   did_first: "{0} puts order {1} first", did_up: "{0} moves order {1} up", did_clear: "{0} clears the queue", did_reset: "{0} says that it stands at the delivery", did_place: "{0} says that it stands at {1}", did_pick_auto: "{0} lets the robot pick goods up by itself", did_pick_manual: "{0} has a person pick goods up",
-  did_picked: "{0} says that the goods are picked up", did_gains: "{0} sets the line control to {1}", did_calibrate: "{0} calibrates", did_obstacle_put: "{0} puts an obstacle at {1}", did_obstacle_take: "{0} takes away the obstacle at {1}",
+  did_picked: "{0} says that the goods are picked up", did_gains: "{0} sets the line control to {1}", did_calibrate: "{0} calibrates", did_restart: "{0} restarts {1}", restart_board: "Restart {0}", did_obstacle_put: "{0} puts an obstacle at {1}", did_obstacle_take: "{0} takes away the obstacle at {1}",
   field_range: "{0}: a number from {1} to {2}", field_least: "{0}: a number from {1} up",
   fleet: "Robots", orders_wait: "waiting orders: {0}", not_here: "{0} is not here", stop_all: "Stop all",
   hold_longer: "hold it for a second", stopped_again: "it was stopped again meanwhile", still_moves: "it still moves", by_hand: "driven by hand", was_to_fetch: "was to fetch {0}", then_stands: "Released, it stands until somebody drives it.",

@@ -39,7 +39,7 @@ export const WORDS = {
   by_comm: "stationen", by_operator: "ett kommando i en terminal",
   did_stop: "{0} stoppar den", did_resume: "{0} häver stoppet", did_mode: "{0} gör den {1}", did_take: "{0} tar ratten", did_free: "{0} lämnar ratten", did_order: "{0} beställer {1}", did_cancel: "{0} tar bort order {1}",
   did_first: "{0} lägger order {1} först", did_up: "{0} flyttar upp order {1}", did_clear: "{0} tömmer kön", did_reset: "{0} säger att den står vid leveransen", did_place: "{0} säger att den står vid {1}", did_pick_auto: "{0} låter roboten plocka upp varor själv", did_pick_manual: "{0} låter en människa plocka upp varor",
-  did_picked: "{0} säger att varan är upplockad", did_gains: "{0} sätter linjeregleringen till {1}", did_calibrate: "{0} kalibrerar", did_obstacle_put: "{0} ställer ut ett hinder vid {1}", did_obstacle_take: "{0} tar bort hindret vid {1}",
+  did_picked: "{0} säger att varan är upplockad", did_gains: "{0} sätter linjeregleringen till {1}", did_calibrate: "{0} kalibrerar", did_restart: "{0} startar om {1}", restart_board: "Starta om {0}", did_obstacle_put: "{0} ställer ut ett hinder vid {1}", did_obstacle_take: "{0} tar bort hindret vid {1}",
   field_range: "{0}: ett tal från {1} till {2}", field_least: "{0}: ett tal från {1}",
   fleet: "Robotar", orders_wait: "väntande order: {0}", not_here: "{0} finns inte här", stop_all: "Stoppa alla",
   hold_longer: "håll den i en sekund", stopped_again: "den stoppades igen under tiden", still_moves: "den rör sig ännu", by_hand: "körs för hand", was_to_fetch: "skulle hämta {0}", then_stands: "Släppt står den tills någon kör den.",
