@@ -12,19 +12,20 @@
 //! In every state a failure ends the step: the robot stands, what held before the step holds again,
 //! and the step begins anew with a sentence that says why.
 
+mod answers;
+mod shown;
+
 use core::time::Duration;
 
 use lager_operator::{Driving, For, Ids, Seen};
-use lager_orders::{Mode, Moment, Reason};
+use lager_orders::{Moment, Reason};
 use lager_topics::{
     Calibration, Health, Outcome, Part, ProfileState, SteeringOrder, SteeringReport,
 };
-use lager_wire::{
-    BUILD, Centimetres, FULL_TURNS_MS, LineBits, OperatorCommand, RobotProfile, Speed, Version,
-};
+use lager_wire::{Centimetres, LineBits, OperatorCommand, RobotProfile};
 
 use crate::answer::{Answer, Way};
-use crate::range::{DISTANCES_CM, MEASURING, Point};
+use crate::range::{MEASURING, Point};
 use crate::recent::Recent;
 use crate::step::{Question, Step};
 use crate::words::Said;
@@ -44,13 +45,6 @@ const CALIBRATE: Duration = Duration::from_secs(8);
 const LONGEST: Duration = Duration::from_secs(60);
 /// Without a new `link/health` for this long, nobody knows how the boards are.
 const UNHEARD: Duration = Duration::from_secs(1);
-/// How far a meter's voltage may be from the board's, in tenths of a volt.
-const METER: u8 = 10;
-/// Possible lengths of a measured drive, in cm.
-const LENGTHS_CM: [f32; 2] = [30.0, 300.0];
-/// Possible speeds, in mm/s.
-const SPEEDS_MM_PER_S: [f32; 2] = [10.0, 1_000.0];
-
 /// The parts of the description that are found out.
 const TOLD: [Part; 2] = [Part::Steering, Part::Sensors];
 
@@ -207,61 +201,6 @@ impl Commissioning {
     /// Takes what there is to say: results, and why something does not go on.
     pub fn said(&mut self) -> Vec<Said> {
         core::mem::take(&mut self.said)
-    }
-
-    /// The values that belong to the present step, as they are now.
-    pub fn shown(&self, now: Duration) -> Said {
-        let none = || Said::from("live_none");
-        match (self.state, self.step) {
-            (State::Tells { .. }, _) => "live_tells".into(),
-            (State::Calibrates { .. }, _) => {
-                let sensors = self.health.iter().flat_map(|(_, health)| health.calibrated);
-                let count = sensors.filter(|sensor| sensor.tells_apart != 0).count();
-                Said::new("live_calibration", &[("count", &count)])
-            }
-            (
-                State::Moves {
-                    begun: Some(begun),
-                    is_pulse: false,
-                    ..
-                },
-                _,
-            ) => {
-                let seconds = format!("{:.1}", now.saturating_sub(begun).as_secs_f32());
-                Said::new("live_seconds", &[("seconds", &seconds)])
-            }
-            (_, Step::Line) => self.bits.mode(now).map_or_else(none, |bits| {
-                Said::new("live_line", &[("bits", &line::bar(bits))])
-            }),
-            (_, Step::Distance) => self.readings.median(now).map_or_else(none, |reading| {
-                Said::new("live_range", &[("reading", &reading)])
-            }),
-            (_, Step::Wheels | Step::Turn | Step::Speed) => {
-                self.report.map_or_else(none, |report| {
-                    let duties: [(_, &dyn ToString); 2] =
-                        [("left", &report.left_duty), ("right", &report.right_duty)];
-                    Said::new("live_wheels", &duties)
-                })
-            }
-            (_, Step::Battery) => self.volts(now).map_or_else(none, |[low, high]| {
-                let values: [(_, &dyn ToString); 2] = [("low", &volts(low)), ("high", &volts(high))];
-                Said::new("live_battery", &values)
-            }),
-            (_, Step::Boards | Step::Finish) => {
-                let health = self.health.map(|(_, health)| health).unwrap_or_default();
-                let board = |board: lager_topics::BoardHealth| match board.up {
-                    0 => Said::from("board_gone"),
-                    _ => Said::new("board_up", &[("build", &board.build)]),
-                };
-                Said::of(
-                    "live_boards",
-                    [
-                        ("sensor", board(health.sensor)),
-                        ("steering", board(health.steering)),
-                    ],
-                )
-            }
-        }
     }
 }
 
@@ -445,171 +384,6 @@ impl Commissioning {
         }
     }
 
-    fn answered(&mut self, now: Moment, answer: Answer) -> Result<(), Said> {
-        let silent = || Said::from("no_values");
-        match (self.question, answer) {
-            (Question::Boards, Answer::Yes) => {
-                self.boards_fit(now.robot)?;
-                self.enter_unchanged(now, Step::Line);
-            }
-            (Question::LineSway, Answer::Yes) => {
-                let health = self.known(now.robot).ok_or("bridge_silent")?;
-                self.state = State::Calibrates {
-                    since: now.robot,
-                    ended_before: health.calibrations_ended,
-                };
-                self.effects.push(Effect::Calibrate);
-            }
-            (Question::LineFloor, Answer::Yes) => {
-                self.found.floor = self.bits.mode(now.robot).ok_or_else(silent)?;
-                self.ask(Question::LineTape);
-            }
-            (Question::LineTape, Answer::Yes) => {
-                let tape = self.bits.mode(now.robot).ok_or_else(silent)?;
-                let is_inverted = line::is_inverted(self.found.floor, tape)?;
-                let line = &mut self.built.robot.sensors.line;
-                line.dark_is_high ^= is_inverted;
-                let said = match line.dark_is_high {
-                    true => "found_polarity_high",
-                    false => "found_polarity_low",
-                };
-                self.done(now, said);
-            }
-            (Question::RangeFar, Answer::Number(cm)) => {
-                self.found.far = self.point(now.robot, cm)?;
-                self.ask(Question::RangeNear);
-            }
-            (Question::RangeNear, Answer::Number(cm)) => {
-                let near = self.point(now.robot, cm)?;
-                let ranger = range::sensor(self.found.far, near)?;
-                self.built.robot.sensors.ranger = ranger;
-                self.done(now, range::said(&ranger));
-            }
-            (Question::WheelsAhead, Answer::Yes) => {
-                self.begin(now, OperatorCommand::Forward(Speed::Full), true)?;
-            }
-            (Question::WheelsLeft, Answer::Yes) => {
-                self.begin(now, OperatorCommand::Left(Speed::Full), true)?;
-            }
-            (Question::SawAhead, Answer::Ways(ways)) => {
-                if ways.contains(&Way::Still) {
-                    return Err("wheel_still".into());
-                }
-                self.found.ahead = Some(ways);
-                self.ask(Question::WheelsLeft);
-            }
-            (Question::SawLeft, Answer::Ways(left)) => {
-                let ahead = self.found.ahead.unwrap_or([Way::Still; 2]);
-                let plain = self.built.robot.steering.wheels;
-                let wheels = wheels::connected(plain, ahead, left)?;
-                self.built.robot.steering.wheels = wheels;
-                self.done(now, wheels::said(&wheels));
-            }
-            (Question::Battery, Answer::No) => {
-                self.built.robot.steering.divider = false;
-                self.done(now, "found_no_divider");
-            }
-            (Question::Battery, Answer::Number(meter)) => {
-                let [low, high] = self.volts(now.robot).ok_or_else(silent)?;
-                let meter_decivolts = (meter * 10.0).round().clamp(0.0, 255.0) as u8;
-                let is_near = |value: u8| value.abs_diff(meter_decivolts) <= METER;
-                if !is_near(low) || !is_near(high) {
-                    let values: [(_, &dyn ToString); 3] =
-                        [("low", &volts(low)), ("high", &volts(high)), ("volts", &meter)];
-                    return Err(Said::new("battery_unfit", &values));
-                }
-                self.built.robot.steering.divider = true;
-                self.done(now, "found_divider");
-            }
-            (Question::Turn, Answer::Yes) => {
-                self.begin(now, OperatorCommand::Left(Speed::Full), false)?;
-                self.question = Question::TurnRound;
-            }
-            (Question::Speed, Answer::Number(cm)) => {
-                let [least, most] = LENGTHS_CM;
-                within(cm, least, most)?;
-                self.found.length_mm = cm * 10.0;
-                self.begin(now, OperatorCommand::FollowForward, false)?;
-                self.question = Question::SpeedThere;
-            }
-            (Question::Finish, Answer::Yes) => {
-                self.effects.push(Effect::Keep(self.built));
-                self.state = State::Over;
-            }
-            (Question::Finish, Answer::No) => self.quit(now),
-            // A person who says no to a movement, or not yet, is asked again.
-            _ => {}
-        }
-        Ok(())
-    }
-
-    /// A movement that waited for an answer has taken so long.
-    fn measured(&mut self, now: Moment, span: Duration) -> Result<(), Said> {
-        if self.question == Question::TurnRound {
-            let [least, most] = [*FULL_TURNS_MS.start(), *FULL_TURNS_MS.end()];
-            let ms = u16::try_from(span.as_millis()).unwrap_or(u16::MAX);
-            if !FULL_TURNS_MS.contains(&ms) {
-                let values: [(_, &dyn ToString); 3] =
-                    [("ms", &ms), ("least", &least), ("most", &most)];
-                return Err(Said::new("turn_unfit", &values));
-            }
-            self.built.robot.steering.wheels.full_turn_ms = ms;
-            self.done(now, Said::new("found_turn", &[("ms", &ms)]));
-            return Ok(());
-        }
-        let speed = (self.found.length_mm / span.as_secs_f32() * 10.0).round() / 10.0;
-        let [least, most] = SPEEDS_MM_PER_S;
-        if !(least..=most).contains(&speed) {
-            let values: [(_, &dyn ToString); 3] =
-                [("speed", &speed), ("least", &least), ("most", &most)];
-            return Err(Said::new("speed_unfit", &values));
-        }
-        self.built.cruise_mm_per_s = speed;
-        self.done(now, Said::new("found_speed", &[("speed", &speed)]));
-        Ok(())
-    }
-
-    /// Whether both boards are there, fit, and may be moved by hand.
-    fn boards_fit(&self, now: Duration) -> Result<(), Said> {
-        let health = self.known(now).ok_or("bridge_silent")?;
-        for board in [&health.sensor, &health.steering] {
-            if board.up == 0 {
-                return Err("not_both_boards".into());
-            }
-            if board.version == Version::Original as u8 {
-                return Err("original_board".into());
-            }
-            if board.misfit().is_some() {
-                let values: [(_, &dyn ToString); 2] = [("build", &board.build), ("wanted", &BUILD)];
-                return Err(Said::new("board_misfit", &values));
-            }
-        }
-        if health.mode != Mode::Manual {
-            return Err("not_by_hand".into());
-        }
-        if health.stopped != 0 {
-            return Err("stop_in_force".into());
-        }
-        if !is_obeyed(health) {
-            return Err("undescribed".into());
-        }
-        Ok(())
-    }
-
-    /// A known distance, and what the sensor reads there.
-    fn point(&self, now: Duration, cm: f32) -> Result<Point, Said> {
-        let [least, most] = DISTANCES_CM;
-        within(cm, least.into(), most.into())?;
-        let reading = self.readings.median(now).ok_or("no_values")?;
-        Ok((cm.round() as u8, reading))
-    }
-
-    /// The least and the greatest voltage of the last half second, in tenths of a volt.
-    fn volts(&self, now: Duration) -> Option<[u8; 2]> {
-        let all = self.volts.all(now)?;
-        Some([*all.first()?, *all.last()?])
-    }
-
     /// `link/health`, if it is new.
     fn known(&self, now: Duration) -> Option<&Health> {
         let (at, health) = self.health.as_ref()?;
@@ -756,16 +530,4 @@ fn is_obeyed(health: &Health) -> bool {
     [health.steering_profile, health.sensor_profile]
         .iter()
         .all(|told| *told == ProfileState::Accepted)
-}
-
-fn within(value: f32, least: f32, most: f32) -> Result<(), Said> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    let values: [(_, &dyn ToString); 3] = [("value", &value), ("least", &least), ("most", &most)];
-    Err(Said::new("number_unfit", &values))
-}
-
-fn volts(decivolts: u8) -> String {
-    format!("{:.1}", f32::from(decivolts) / 10.0)
 }

@@ -104,6 +104,8 @@ mod tests {
     fn every_sentence_stands_in_both_languages_with_the_same_values_and_is_used() {
         let sources = [
             include_str!("machine.rs"),
+            include_str!("machine/answers.rs"),
+            include_str!("machine/shown.rs"),
             include_str!("step.rs"),
             include_str!("line.rs"),
             include_str!("range.rs"),

@@ -56,18 +56,18 @@ const WIDTH: usize = 76;
 /// # Errors
 /// The robot is not up, or the description cannot be written.
 pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> Result<ExitCode> {
+    let running = configured.of_running_robot()?;
+    let running = running.unwrap_or_else(|| configured.clone());
     if args.undo {
-        let path = configured.forget_description()?;
+        let path = running.forget_description()?;
         let said = format!("{} is as it was before; start the robot again", path.display());
         console::print(&said)?;
         return Ok(ExitCode::SUCCESS);
     }
     diagnose::must_be_up(configured)?;
     let patience = TimeLimit::in_order(configured, shutdown)?;
-    let running = configured.of_running_robot()?;
-    let running = running.unwrap_or_else(|| configured.clone());
     // It must have a place before a person works for a quarter of an hour.
-    configured.place_of_description()?;
+    running.place_of_description()?;
     let BusConfig { speed, clock, .. } = running.bus()?;
     let bus = BusConfig {
         speed,
@@ -100,12 +100,7 @@ pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> R
 }
 
 /// Writes what was found out.
-fn keep(configured: &Config, running: Config, built: &Built) -> Result<ExitCode> {
-    let mut new = Config {
-        robot: configured.robot.clone(),
-        state: configured.state.clone(),
-        ..running
-    };
+fn keep(configured: &Config, mut new: Config, built: &Built) -> Result<ExitCode> {
     new.take_commissioned(built);
     let path = new.keep_description(configured).with_context(|| {
         // A quarter of an hour's work must not be lost.

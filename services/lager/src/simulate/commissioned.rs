@@ -8,8 +8,11 @@ use std::time::Duration;
 use lager_commission::{Answer, Built, Commissioning, Effect, Question, Step, Way};
 use lager_orders::{Language, Mode, Moment};
 use lager_plant::{Build, Pose};
+use lager_simulator::Wire;
+use lager_stop::Stop;
 use lager_supervisor::mission::{Helper, Mission, Watch};
-use lager_topics::{Ask, AskKind, BridgeAnswer, Part};
+use lager_topics::{Ask, AskKind, BridgeAnswer, Part, Role, StopCause};
+use lager_wire::ResetCause;
 
 use super::built::{LIMIT, robot, seeds};
 use super::Whole;
@@ -281,6 +284,13 @@ impl Person {
         self.machine().answer(now, answer);
     }
 
+    /// Somebody else stops the robot.
+    fn stop(&mut self) {
+        let stop = Stop::new(Role::Operator, StopCause::Ordered, 1);
+        self.whole.bridge.stop(stop);
+        self.whole.stirred = true;
+    }
+
     fn duties(&self) -> [i16; 2] {
         self.whole.robot.world().duties()
     }
@@ -334,6 +344,33 @@ fn before_that_it_fails_and_says_why_if_its_build_matters() {
         let mut whole = robot(&Config::default(), build, seed);
         let why = whole.run(LIMIT).expect("it cannot deliver");
         assert!(whole.failure_kind().is_some(), "seed {seed}: {why}");
+    }
+}
+
+#[test]
+fn it_begins_only_with_boards_that_a_person_may_move() {
+    let mut person = Person::new(&Config::default(), Build::default(), 1);
+    person.wait(Duration::from_secs(1));
+    let manual = Mode::Manual;
+    for (mode, stopped, why) in [
+        (Mode::Autonomous, false, "not in manual mode"),
+        (manual, true, "the robot is stopped"),
+    ] {
+        person.whole.ask(&Ask {
+            kind: AskKind::SetMode.into(),
+            mode: mode.into(),
+            issued_ns: person.whole.moment().ns,
+            ..Ask::default()
+        });
+        if stopped {
+            person.stop();
+        }
+        person.wait(Duration::from_secs(1));
+        person.say(Answer::Yes);
+        person.wait(Duration::from_secs(1));
+        let said = person.said.pop().expect("a sentence");
+        assert!(said.contains(why), "{said}");
+        assert_eq!(person.machine().step(), Step::Boards);
     }
 }
 
@@ -398,18 +435,11 @@ fn nothing_moves_unasked_and_every_movement_ends_by_itself() {
 
 #[test]
 fn a_stop_and_a_board_that_restarts_end_the_step_and_the_robot_stands() {
-    use lager_simulator::Wire;
-    use lager_stop::Stop;
-    use lager_topics::{Role, StopCause};
-    use lager_wire::ResetCause;
-
     let mut person = Person::new(&Config::default(), Build::default(), 1);
     person.until(Question::TurnRound);
     person.wait(Duration::from_secs(1));
     assert_ne!(person.duties(), [0, 0]);
-    let stop = Stop::new(Role::Operator, StopCause::Ordered, 1);
-    person.whole.bridge.stop(stop);
-    person.whole.stirred = true;
+    person.stop();
     person.wait(Duration::from_millis(300));
     assert_eq!(person.duties(), [0, 0]);
     person.wait(Duration::from_millis(500));
