@@ -100,17 +100,25 @@ impl Person {
         });
     }
 
-    /// Waits until this is asked, and its values are shown.
-    fn asked(&mut self, question: Question) {
-        let text = question.text(Language::English);
-        self.until(&text, |person| {
-            let place = person.printed.iter().position(|line| *line == text);
-            place.is_some_and(|place| person.printed.len() > place + 1)
-        });
+    /// What was asked since the last answer, if its values are shown, too.
+    fn question(&self) -> Option<Question> {
+        let all = Question::ALL.map(|question| (question, question.text(Language::English)));
+        let lines = self.printed.iter().rev().skip(1);
+        let mut asked = lines.filter_map(|line| all.iter().find(|(_, text)| text == line));
+        asked.next().map(|(question, _)| *question)
+    }
+
+    /// Waits until something is asked.
+    fn asked(&mut self) -> Question {
+        self.until("a question", |person| person.question().is_some());
+        let question = self.question().expect("as waited for");
         self.printed.clear();
-        // A person looks before he answers, and a sensor needs its time.
+        question
+    }
+
+    /// Takes the time that a sensor needs to see what has been done.
+    fn pause(&self) {
         std::thread::sleep(Duration::from_millis(800));
-        self.look();
     }
 
     fn say(&mut self, answer: &str) {
@@ -140,79 +148,97 @@ impl Person {
         self.act(WorldAskKind::Place, x, y, Heading::Right);
     }
 
-    fn lift_and_look(&mut self, asked: Question, saw: Question) {
-        self.asked(asked);
-        self.act(WorldAskKind::Lift, 0, 0, Heading::Right);
-        self.ways = ['0'; 2];
-        self.say("yes");
-        self.asked(saw);
-        let ways: String = self.ways.iter().collect();
-        self.say(&ways);
-    }
-
-    /// Answers every question from what he sees.
-    fn commission(&mut self) {
-        self.asked(Question::Boards);
-        self.say("yes");
-
-        self.asked(Question::LineSway);
-        self.place(0, 0);
-        self.say("yes");
-        let text = Question::LineFloor.text(Language::English);
+    /// Moves the line sensors over tape and floor until something else is asked.
+    fn sway(&mut self) {
         for step in (0..).map(|step: i16| step % 24) {
-            let left = if step < 12 { 10 } else { -10 };
             if step == 0 {
                 self.place(0, 0);
                 self.shift(-SWAY);
             }
-            self.shift(left);
+            self.shift(if step < 12 { 10 } else { -10 });
             self.look();
-            if self.printed.contains(&text) {
-                break;
+            if self.question().is_some() {
+                return;
             }
             std::thread::sleep(Duration::from_millis(60));
         }
-        self.asked(Question::LineFloor);
-        self.place(0, 0);
-        self.shift(100);
-        std::thread::sleep(Duration::from_millis(800));
-        self.say("yes");
-        self.asked(Question::LineTape);
-        self.place(0, 0);
-        std::thread::sleep(Duration::from_millis(800));
-        self.say("yes");
+    }
 
-        for (question, cm) in [(Question::RangeFar, 30), (Question::RangeNear, 20)] {
-            self.asked(question);
-            self.act(WorldAskKind::Hold, cm, 0, Heading::Right);
-            std::thread::sleep(Duration::from_millis(800));
-            self.say(&cm.to_string());
+    /// Answers yes when the robot is there, unless it stands and is to begin anew.
+    fn watch(&mut self, is_there: impl Fn(&Truth) -> bool) {
+        self.until("the end of a movement", |person| {
+            is_there(&person.seen) || person.question().is_some()
+        });
+        if self.question().is_none() {
+            self.say("yes");
         }
+    }
 
-        self.lift_and_look(Question::WheelsAhead, Question::SawAhead);
-        self.lift_and_look(Question::WheelsLeft, Question::SawLeft);
+    /// Answers what is asked, from what is seen. Returns whether it was the last question.
+    fn answer(&mut self, question: Question) -> bool {
+        let begun = self.seen;
+        match question {
+            Question::Boards | Question::Finish => self.say("yes"),
+            Question::LineSway => {
+                self.say("yes");
+                self.sway();
+            }
+            Question::LineFloor | Question::LineTape => {
+                self.place(0, 0);
+                if question == Question::LineFloor {
+                    self.shift(100);
+                }
+                self.pause();
+                self.say("yes");
+            }
+            Question::RangeFar | Question::RangeNear => {
+                let cm = if question == Question::RangeFar {
+                    30
+                } else {
+                    20
+                };
+                self.act(WorldAskKind::Hold, cm, 0, Heading::Right);
+                self.pause();
+                self.say(&cm.to_string());
+            }
+            Question::WheelsAhead | Question::WheelsLeft => {
+                self.act(WorldAskKind::Lift, 0, 0, Heading::Right);
+                self.pause();
+                self.look();
+                self.ways = ['0'; 2];
+                self.say("yes");
+            }
+            Question::SawAhead | Question::SawLeft => {
+                let ways: String = self.ways.iter().collect();
+                self.say(&ways);
+            }
+            Question::Battery => self.say("no"),
+            Question::Turn => {
+                self.place(1, 1);
+                self.pause();
+                self.say("yes");
+            }
+            Question::TurnRound => {
+                self.watch(|truth| truth.heading_rad - begun.heading_rad >= TAU);
+            }
+            Question::Speed => {
+                self.place(0, 0);
+                self.pause();
+                self.say(&format!("{:.0}", DRIVE / 10.0));
+            }
+            Question::SpeedThere => self.watch(|truth| truth.x_mm - begun.x_mm >= DRIVE),
+        }
+        question == Question::Finish
+    }
 
-        self.asked(Question::Battery);
-        self.say("no");
-
-        self.asked(Question::Turn);
-        self.place(1, 1);
-        self.until("it stands in the middle", |person| person.seen.y_mm > 400.0);
-        let begun = self.seen.heading_rad;
-        self.say("yes");
-        self.until("a full turn", |person| person.seen.heading_rad - begun >= TAU);
-        self.say("yes");
-
-        self.asked(Question::Speed);
-        self.place(0, 0);
-        self.until("it stands at the start", |person| person.seen.y_mm < 100.0);
-        let begun = self.seen.x_mm;
-        self.say(&format!("{:.0}", DRIVE / 10.0));
-        self.until("the length", |person| person.seen.x_mm - begun >= DRIVE);
-        self.say("yes");
-
-        self.asked(Question::Finish);
-        self.say("yes");
+    /// Answers every question.
+    fn commission(&mut self) {
+        loop {
+            let question = self.asked();
+            if self.answer(question) {
+                break;
+            }
+        }
         let ended = wait_for("its end", || self.child.try_wait().expect("a child"));
         self.look();
         assert!(ended.success(), "{:#?}", self.printed);
@@ -310,11 +336,11 @@ fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
     ];
     for end in ends {
         let mut person = Person::new(&domain, &bus, &config);
-        person.asked(Question::Boards);
-        person.say("yes");
-        person.asked(Question::LineSway);
-        person.say("skip");
-        person.asked(Question::RangeFar);
+        for (question, answer) in [(Question::Boards, "yes"), (Question::LineSway, "skip")] {
+            assert_eq!(person.asked(), question);
+            person.say(answer);
+        }
+        assert_eq!(person.asked(), Question::RangeFar);
         described("a trial", &|now| now != before);
         end(&mut person);
         let _ = wait_for("its end", || person.child.try_wait().expect("a child"));

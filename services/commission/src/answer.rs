@@ -95,7 +95,9 @@ mod tests {
         let read = |line| Answer::read(line, Takes::Number);
         assert_eq!(read("12,34"), Ok(Answer::Number(12.34)));
         assert_eq!(read("12.34"), Ok(Answer::Number(12.34)));
-        for wrong in ["1.234,5", "1,234.5", "", ".", "inf", "-3", "1e3", "nan", "12 cm"] {
+        for wrong in [
+            "1.234,5", "1,234.5", "", ".", "inf", "-3", "1e3", "nan", "12 cm",
+        ] {
             assert!(read(wrong).is_err(), "{wrong}");
         }
     }

@@ -50,7 +50,9 @@ pub(crate) fn dull(health: &Health) -> Option<Said> {
 pub(crate) fn bar(bits: u16) -> String {
     let sensors = 0..LineBits::SENSORS;
     let tape = |index| LineBits::new(bits).sensor(index);
-    sensors.map(|index| if tape(index) { '#' } else { '-' }).collect()
+    sensors
+        .map(|index| if tape(index) { '#' } else { '-' })
+        .collect()
 }
 
 /// The numbers of these sensors, counted from the left.

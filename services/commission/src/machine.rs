@@ -44,7 +44,7 @@ const CALIBRATE: Duration = Duration::from_secs(8);
 /// The longest movement that waits for an answer.
 const LONGEST: Duration = Duration::from_secs(60);
 /// Without a new `link/health` for this long, nobody knows how the boards are.
-const UNHEARD: Duration = Duration::from_secs(1);
+const UNHEARD: Duration = Duration::from_secs(2);
 /// The parts of the description that are found out.
 const TOLD: [Part; 2] = [Part::Steering, Part::Sensors];
 
@@ -116,6 +116,8 @@ pub struct Commissioning {
     wanted: RobotProfile,
     /// What they obey of it; `None` if nobody knows.
     told: [Option<RobotProfile>; TOLD.len()],
+    /// What the bridge was asked to tell, and has not answered yet.
+    under_way: Option<RobotProfile>,
     /// The hash of it in `link/health`, once that has come.
     description: Option<u32>,
     /// The person ends it, and the boards are told what they were told before.
@@ -146,6 +148,7 @@ impl Commissioning {
             original: built,
             wanted: built.robot,
             told: [None; TOLD.len()],
+            under_way: None,
             description: None,
             is_leaving: false,
             found: Found::default(),
@@ -215,7 +218,9 @@ impl Commissioning {
         if self.step == Step::Boards || self.state == State::Over {
             return;
         }
-        let is_told_otherwise = self.description.is_some_and(|told| told != health.description);
+        let is_told_otherwise = self
+            .description
+            .is_some_and(|told| told != health.description);
         if is_told_otherwise {
             self.told = [None; TOLD.len()];
         }
@@ -242,14 +247,14 @@ impl Commissioning {
 
     /// To be called with the bridge's answer to [`Effect::Describe`]; `None` if there was none.
     pub fn described(&mut self, now: Moment, part: Part, outcome: Option<Outcome>) {
+        let asked = self.under_way.take();
+        let is_told = outcome == Some(Outcome::Done);
+        if let Some(told) = self.told.get_mut(part as usize) {
+            *told = asked.filter(|_| is_told);
+        }
         let State::Tells { since, .. } = self.state else {
             return;
         };
-        let place = part as usize;
-        let is_told = outcome == Some(Outcome::Done);
-        if is_told && let Some(told) = self.told.get_mut(place) {
-            *told = Some(self.wanted);
-        }
         let pause = if is_told { Duration::ZERO } else { RETRY };
         self.state = State::Tells {
             since,
@@ -445,14 +450,19 @@ impl Commissioning {
         self.tell_next(now.robot);
     }
 
-    /// Tells the next part that a board does not obey yet.
+    /// Tells the next part that a board does not obey yet, one at a time.
     fn tell_next(&mut self, since: Duration) {
+        if self.under_way.is_some() {
+            self.state = State::Tells { since, due: None };
+            return;
+        }
         let is_open = |part: &Part| match (part, self.told[*part as usize]) {
             (_, None) => true,
             (Part::Steering, Some(told)) => told.steering != self.wanted.steering,
             (_, Some(told)) => told.sensors != self.wanted.sensors,
         };
         if let Some(part) = TOLD.into_iter().find(is_open) {
+            self.under_way = Some(self.wanted);
             self.effects.push(Effect::Describe(part, self.wanted));
             self.state = State::Tells { since, due: None };
             return;
@@ -461,12 +471,17 @@ impl Commissioning {
         self.bits.clear();
         self.readings.clear();
         self.volts.clear();
-        self.state = if self.is_leaving { State::Over } else { State::Asks };
+        self.state = if self.is_leaving {
+            State::Over
+        } else {
+            State::Asks
+        };
     }
 
     /// A board does not take a description.
     fn undescribed(&mut self, now: Moment) {
         self.told = [None; TOLD.len()];
+        self.under_way = None;
         if self.is_leaving {
             self.said.push("undescribed".into());
             self.state = State::Over;

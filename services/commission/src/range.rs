@@ -28,7 +28,9 @@ pub(crate) const MEASURING: RangerProfile = RangerProfile {
 
 /// The reading for a distance that was told by [`MEASURING`]; 0 for nothing.
 pub(crate) fn reading(cm: u8) -> u16 {
-    let RangerProfile { near_cm, far_cm, .. } = MEASURING;
+    let RangerProfile {
+        near_cm, far_cm, ..
+    } = MEASURING;
     let inverse = |cm: u8| 1.0 / f32::from(cm.clamp(near_cm, far_cm));
     let part = (inverse(cm) - inverse(far_cm)) / (inverse(near_cm) - inverse(far_cm));
     (part * f32::from(IR_MAX)).round() as u16

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 /// How far back a value counts, in robot time.
 const WINDOW: Duration = Duration::from_millis(500);
 /// Without a new value for this long, the sensor is silent.
-const SILENT: Duration = Duration::from_millis(200);
+const SILENT: Duration = Duration::from_millis(400);
 /// So many values are needed; one alone may be disturbed.
 const FEWEST: usize = 5;
 
@@ -85,7 +85,7 @@ mod tests {
         for at in 0..10 {
             recent.push(ms(at), 1);
         }
-        assert_eq!(recent.median(ms(209)), Some(1));
-        assert_eq!(recent.median(ms(210)), None);
+        assert_eq!(recent.median(ms(409)), Some(1));
+        assert_eq!(recent.median(ms(410)), None);
     }
 }

@@ -79,7 +79,10 @@ pub enum Takes {
 
 /// What a person is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the table of sentences says what each one asks")]
+#[allow(
+    missing_docs,
+    reason = "the table of sentences says what each one asks"
+)]
 pub enum Question {
     Boards,
     LineSway,
@@ -100,6 +103,26 @@ pub enum Question {
 }
 
 impl Question {
+    /// All questions, in their order.
+    pub const ALL: [Self; 16] = [
+        Self::Boards,
+        Self::LineSway,
+        Self::LineFloor,
+        Self::LineTape,
+        Self::RangeFar,
+        Self::RangeNear,
+        Self::WheelsAhead,
+        Self::SawAhead,
+        Self::WheelsLeft,
+        Self::SawLeft,
+        Self::Battery,
+        Self::Turn,
+        Self::TurnRound,
+        Self::Speed,
+        Self::SpeedThere,
+        Self::Finish,
+    ];
+
     /// What is asked, in this language.
     pub fn text(self, language: Language) -> String {
         Said::from(self.sentence()).text(language)

@@ -76,9 +76,22 @@ mod tests {
             };
             // What the wheels do when the drivers run so.
             let turned = |[left, right]: [bool; 2]| {
-                let [left, right] = if wheels.swapped { [right, left] } else { [left, right] };
-                let way = |forwards| if forwards { Way::Forwards } else { Way::Backwards };
-                [way(left != wheels.left_reversed), way(right != wheels.right_reversed)]
+                let [left, right] = if wheels.swapped {
+                    [right, left]
+                } else {
+                    [left, right]
+                };
+                let way = |forwards| {
+                    if forwards {
+                        Way::Forwards
+                    } else {
+                        Way::Backwards
+                    }
+                };
+                [
+                    way(left != wheels.left_reversed),
+                    way(right != wheels.right_reversed),
+                ]
             };
             let found = connected(plain(wheels), turned([true, true]), turned([false, true]));
             assert_eq!(found, Ok(wheels));

@@ -28,9 +28,8 @@ pub enum Said {
 impl Said {
     /// The sentence `name`, with values by their keys.
     pub(crate) fn new(name: &'static str, values: &[(&'static str, &dyn ToString)]) -> Self {
-        let plain = |(key, value): &(&'static str, &dyn ToString)| {
-            (*key, Self::Plain(value.to_string()))
-        };
+        let plain =
+            |(key, value): &(&'static str, &dyn ToString)| (*key, Self::Plain(value.to_string()));
         Self::Here {
             name,
             values: values.iter().map(plain).collect(),
@@ -133,8 +132,14 @@ mod tests {
     fn a_sentence_within_a_sentence_has_the_readers_language() {
         let said = Said::of("ended", [("why", "wheel_still".into())]);
         let english = said.text(Language::English);
-        assert!(english.contains("stands: a wheel did not turn"), "{english}");
+        assert!(
+            english.contains("stands: a wheel did not turn"),
+            "{english}"
+        );
         let swedish = said.text(Language::Swedish);
-        assert!(swedish.contains("står: ett hjul snurrade inte"), "{swedish}");
+        assert!(
+            swedish.contains("står: ett hjul snurrade inte"),
+            "{swedish}"
+        );
     }
 }

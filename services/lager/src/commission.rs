@@ -60,7 +60,10 @@ pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> R
     let running = running.unwrap_or_else(|| configured.clone());
     if args.undo {
         let path = running.forget_description()?;
-        let said = format!("{} is as it was before; start the robot again", path.display());
+        let said = format!(
+            "{} is as it was before; start the robot again",
+            path.display()
+        );
         console::print(&said)?;
         return Ok(ExitCode::SUCCESS);
     }

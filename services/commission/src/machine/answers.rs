@@ -90,8 +90,11 @@ impl Commissioning {
                 let meter_decivolts = (meter * 10.0).round().clamp(0.0, 255.0) as u8;
                 let is_near = |value: u8| value.abs_diff(meter_decivolts) <= METER;
                 if !is_near(low) || !is_near(high) {
-                    let values: [(_, &dyn ToString); 3] =
-                        [("low", &volts(low)), ("high", &volts(high)), ("volts", &meter)];
+                    let values: [(_, &dyn ToString); 3] = [
+                        ("low", &volts(low)),
+                        ("high", &volts(high)),
+                        ("volts", &meter),
+                    ];
                     return Err(Said::new("battery_unfit", &values));
                 }
                 self.built.robot.steering.divider = true;

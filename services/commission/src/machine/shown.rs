@@ -43,7 +43,8 @@ impl Commissioning {
                 })
             }
             (_, Step::Battery) => self.volts(now).map_or_else(none, |[low, high]| {
-                let values: [(_, &dyn ToString); 2] = [("low", &volts(low)), ("high", &volts(high))];
+                let values: [(_, &dyn ToString); 2] =
+                    [("low", &volts(low)), ("high", &volts(high))];
                 Said::new("live_battery", &values)
             }),
             (_, Step::Boards | Step::Finish) => {

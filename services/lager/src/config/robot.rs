@@ -24,9 +24,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use lager_commission::Built;
 use lager_station::files;
 use lager_supervisor::state_folder::StateFolder;
-use lager_wire::{
-    ArmProfile, IrModel, LineProfile, RangerProfile, RobotProfile, WheelsProfile,
-};
+use lager_wire::{ArmProfile, IrModel, LineProfile, RangerProfile, RobotProfile, WheelsProfile};
 use serde::{Deserialize, Serialize};
 
 use super::invalid;

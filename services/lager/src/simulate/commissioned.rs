@@ -14,8 +14,8 @@ use lager_supervisor::mission::{Helper, Mission, Watch};
 use lager_topics::{Ask, AskKind, BridgeAnswer, Part, Role, StopCause};
 use lager_wire::ResetCause;
 
-use super::built::{LIMIT, robot, seeds};
 use super::Whole;
+use super::built::{LIMIT, robot, seeds};
 use crate::config::Config;
 
 /// Virtual time in which a robot must be commissioned.
@@ -454,12 +454,17 @@ fn a_stop_and_a_board_that_restarts_end_the_step_and_the_robot_stands() {
 
     let mut person = Person::new(&Config::default(), Build::default(), 1);
     person.until(Question::RangeNear);
-    person.whole.robot.reset_board(Wire::Sensor, ResetCause::Watchdog);
+    person
+        .whole
+        .robot
+        .reset_board(Wire::Sensor, ResetCause::Watchdog);
     person.wait(Duration::from_secs(1));
     assert_eq!(person.machine().question(), Some(Question::Boards));
     let said = person.said.last().expect("a sentence");
     assert!(said.contains("a board has restarted"), "{said}");
-    assert!(person.machine().built().robot.sensors.ranger.model == Config::default().distance.model);
+    assert!(
+        person.machine().built().robot.sensors.ranger.model == Config::default().distance.model
+    );
 }
 
 #[test]
