@@ -71,7 +71,10 @@ pub(crate) fn a_board_is_restarted_while_the_robot_stands_and_not_on_its_way(
     scene.wait_to_move();
     page.open_view("health");
     let button = |board: &str| format!("#health [data-row=lost-{board}] button");
-    page.wait_until(&format!("document.querySelector('{}')", button("steering")) + " !== null");
+    page.wait_until(&format!(
+        "document.querySelector('{}') !== null",
+        button("steering")
+    ));
     page.click(&button("steering"));
     let refused = row_says("lost-steering", "on its way by itself");
     page.wait_until(&refused);

@@ -161,6 +161,7 @@ class Remedy(enum.IntEnum):
     Link = 12
     Calibrate = 13
     PutBack = 14
+    Describe = 15
 
 
 class Phase(enum.IntEnum):
@@ -213,6 +214,7 @@ class Hold(enum.IntEnum):
     Arm = 3
     Battery = 4
     Link = 5
+    Undescribed = 6
 
 
 class Pick(enum.IntEnum):
@@ -536,7 +538,7 @@ class CalibratedSensor(Layout):
 
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0x6CB76F6BF9486FB2
+    _hash_ = 0x1DB4CBB74519AF63
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),
@@ -572,20 +574,21 @@ class Health(Layout):
         ("mode_chosen", ctypes.c_uint8),
         ("steering_profile", ctypes.c_uint8),
         ("sensor_profile", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 7),
+        ("reserved", ctypes.c_uint8 * 3),
+        ("description", ctypes.c_uint32),
     ]
     _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role, "steering_profile": ProfileState, "sensor_profile": ProfileState}
     _dtype_ = {
-        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "stop_word", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "steering_profile", "sensor_profile", "reserved"],
-        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (7,))],
-        "offsets": [0, 48, 96, 104, 112, 120, 128, 132, 136, 140, 144, 148, 150, 152, 154, 155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 212, 213, 214, 215, 216, 217],
+        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "stop_word", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "steering_profile", "sensor_profile", "reserved", "description"],
+        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,)), "<u4"],
+        "offsets": [0, 48, 96, 104, 112, 120, 128, 132, 136, 140, 144, 148, 150, 152, 154, 155, 156, 157, 158, 159, 160, 161, 162, 163, 164, 165, 166, 167, 168, 212, 213, 214, 215, 216, 217, 220],
         "itemsize": 224,
     }
 
 
 class Failure(Layout):
     _type_name_ = "lager::Failure"
-    _hash_ = 0xE09B50DE2397B271
+    _hash_ = 0x3C7CC4FB46FA7DB4
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
@@ -605,7 +608,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x351FF1E8976199D4
+    _hash_ = 0x16E71831DADD4315
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -935,7 +938,7 @@ class OrderQueue(Layout):
 
 class Event(Layout):
     _type_name_ = "lager::Event"
-    _hash_ = 0x3385803A4FFBD6E2
+    _hash_ = 0x50F97CFB12CB7B5A
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -956,7 +959,7 @@ class Event(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0xFDFDE4D837284D31
+    _hash_ = 0x69FC0AEE99E8D73D
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),

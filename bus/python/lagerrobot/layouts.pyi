@@ -150,6 +150,7 @@ class Remedy(enum.IntEnum):
     Link = 12
     Calibrate = 13
     PutBack = 14
+    Describe = 15
 
 class Phase(enum.IntEnum):
     WaitingForMap = 0
@@ -197,6 +198,7 @@ class Hold(enum.IntEnum):
     Arm = 3
     Battery = 4
     Link = 5
+    Undescribed = 6
 
 class Pick(enum.IntEnum):
     Manual = 0
@@ -459,6 +461,7 @@ class Health(Layout):
     steering_profile: int
     sensor_profile: int
     reserved: Sequence[int]
+    description: int
 
 class Failure(Layout):
     kind: int

@@ -215,3 +215,132 @@ impl BridgeCore {
         self.asked = Some(Asked::Answered(outcome));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use lager_topics::{Origin, Part, SteeringOrder};
+    use lager_wire::{Packet, Payload, ResetOrder};
+
+    use super::super::tests::{FOLLOW, IDLE, STEERING, at, core, options, report, sensor_up, turn};
+    use super::*;
+    use crate::arbiter::Gate;
+    use crate::machine::Effect;
+
+    #[test]
+    fn a_board_is_told_to_restart_once_and_only_while_the_robot_stands() {
+        let mut core = core();
+        let ask = |core: &mut BridgeCore, millis: u64, board: Callsign| {
+            let ask = Ask {
+                issued_ns: at(millis).ns,
+                lifetime_ms: 500,
+                board: board.into(),
+                kind: AskKind::Restart.into(),
+                ..Ask::default()
+            };
+            core.ask(at(millis), &ask);
+            let mut restarts = 0;
+            while let Some(effect) = core.next(at(millis)) {
+                if let Effect::Write(write) = effect {
+                    let packet = Packet::decode(&write.packet, Version::One).expect("a packet");
+                    restarts += usize::from(packet.payload == Payload::Reset(ResetOrder::Restart));
+                    assert_eq!(write.place, STEERING);
+                }
+            }
+            let outcome = core.answer().and_then(|answer| answer.outcome.get());
+            (outcome, restarts)
+        };
+        let stands = (Some(Outcome::Done), 1);
+        assert_eq!(ask(&mut core, 1_002, Callsign::Steering), stands);
+        let absent = (Some(Outcome::NoBoard), 0);
+        assert_eq!(ask(&mut core, 1_002, Callsign::Sensor), absent);
+        let refused = (Some(Outcome::Refused), 0);
+        assert_eq!(ask(&mut core, 1_002, Callsign::Raspi), refused);
+
+        sensor_up(&mut core, 1_003);
+        let order = SteeringOrder {
+            id: 1,
+            origin: Origin::Operator.into(),
+            code: Command::Wheel(FOLLOW).code(),
+            ..SteeringOrder::default()
+        };
+        let now = at(1_004);
+        assert!(
+            core.order(now.robot, now.robot, Duration::ZERO, &order)
+                .is_some()
+        );
+        turn(&mut core, 1_004);
+        assert_eq!(ask(&mut core, 1_005, Callsign::Steering), refused);
+    }
+
+    #[test]
+    fn a_description_is_tried_only_while_the_robot_stands() {
+        let mut tried = options().robot;
+        tried.steering.wheels.swapped = true;
+        let ask = |core: &mut BridgeCore, millis: u64| {
+            let ask = Ask {
+                issued_ns: at(millis).ns,
+                lifetime_ms: 500,
+                ..Ask::describe(Part::Steering, &tried)
+            };
+            core.ask(at(millis), &ask);
+            turn(core, millis);
+            core.answer().and_then(|answer| answer.outcome.get())
+        };
+        let mut core = core();
+        sensor_up(&mut core, 1_001);
+        let order = SteeringOrder {
+            id: 1,
+            origin: Origin::Operator.into(),
+            code: Command::Wheel(FOLLOW).code(),
+            ..SteeringOrder::default()
+        };
+        let now = at(1_002);
+        assert!(
+            core.order(now.robot, now.robot, Duration::ZERO, &order)
+                .is_some()
+        );
+        turn(&mut core, 1_002);
+        assert_eq!(ask(&mut core, 1_003), Some(Outcome::Refused));
+        assert_eq!(core.profiles.wheels(), Gate::Open, "it goes on as it was");
+
+        let long_after = 1_300;
+        report(&mut core, long_after, IDLE);
+        turn(&mut core, long_after);
+        assert_eq!(ask(&mut core, long_after), None, "the board has to answer");
+        assert_eq!(core.profiles.wheels(), Gate::Held);
+    }
+
+    #[test]
+    fn boards_are_not_reset_nor_calibrated_while_they_drive_and_what_is_unknown_is_refused() {
+        let mut core = core();
+        let mut outcome = |millis: u64, kind| {
+            let ask = Ask {
+                issued_ns: at(millis).ns,
+                lifetime_ms: 500,
+                kind,
+                mode: Mode::Autonomous.into(),
+                ..Ask::default()
+            };
+            core.ask(at(millis), &ask);
+            turn(&mut core, millis);
+            let order = SteeringOrder {
+                id: 1,
+                origin: Origin::Logic.into(),
+                code: Command::Wheel(FOLLOW).code(),
+                ..SteeringOrder::default()
+            };
+            core.order(at(millis).robot, at(millis).robot, Duration::ZERO, &order);
+            core.answer().map(|answer| answer.outcome)
+        };
+        assert_eq!(
+            outcome(1_002, AskKind::SetMode.into()),
+            Some(Outcome::Done.into())
+        );
+        assert_eq!(
+            outcome(1_003, AskKind::Calibrate.into()),
+            Some(Outcome::UnderWay.into())
+        );
+        let unknown = lager_sample::Tag::from_raw(77);
+        assert_eq!(outcome(1_004, unknown), Some(Outcome::Refused.into()));
+    }
+}
