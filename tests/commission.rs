@@ -336,11 +336,14 @@ fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
     ];
     for end in ends {
         let mut person = Person::new(&domain, &bus, &config);
-        for (question, answer) in [(Question::Boards, "yes"), (Question::LineSway, "skip")] {
-            assert_eq!(person.asked(), question);
-            person.say(answer);
+        loop {
+            match person.asked() {
+                Question::RangeFar => break,
+                Question::LineSway => person.say("skip"),
+                // The boards may not be ready yet, and the question comes again.
+                _ => person.say("yes"),
+            }
         }
-        assert_eq!(person.asked(), Question::RangeFar);
         described("a trial", &|now| now != before);
         end(&mut person);
         let _ = wait_for("its end", || person.child.try_wait().expect("a child"));
