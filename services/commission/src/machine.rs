@@ -226,7 +226,7 @@ impl Commissioning {
         }
         let has_changed = self.epochs.is_some_and(|before| before != epochs);
         if up.contains(&0) || has_changed || is_told_otherwise {
-            return self.to_boards(now, "board_changed");
+            return self.fall_back(now, "board_changed");
         }
         self.epochs = Some(epochs);
         if !matches!(self.state, State::Tells { .. }) {
@@ -309,7 +309,7 @@ impl Commissioning {
         }
         let is_busy = !matches!(self.state, State::Asks | State::Over);
         if is_busy && !self.is_leaving && self.known(now.robot).is_none() {
-            return self.to_boards(now, "bridge_silent");
+            return self.fall_back(now, "bridge_silent");
         }
         let past = |since: Duration, span| now.robot >= since + span;
         match self.state {
@@ -486,7 +486,7 @@ impl Commissioning {
             self.said.push("undescribed".into());
             self.state = State::Over;
         } else {
-            self.to_boards(now, "undescribed");
+            self.fall_back(now, "undescribed");
         }
     }
 
@@ -497,7 +497,7 @@ impl Commissioning {
     }
 
     /// A board has gone, or nobody knows how it is: the person looks at the boards first.
-    fn to_boards(&mut self, now: Moment, why: &'static str) {
+    fn fall_back(&mut self, now: Moment, why: &'static str) {
         self.stand(now);
         self.said.push(Said::of("ended", [("why", why.into())]));
         self.built = self.before[self.step as usize];

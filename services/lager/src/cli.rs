@@ -167,7 +167,7 @@ pub enum Command {
     },
     /// Give the boards new images, restart them, or set up a new chip
     Board(BoardArgs),
-    /// Find out how a robot is built: its sensors, motors, speed and battery, by questions and answers
+    /// Find out how a robot is built, by questions to a person who looks at it
     Commission(CommissionArgs),
     /// Pack logs, configuration and versions into one file for a bug report, without secrets
     Report(ReportArgs),
