@@ -115,6 +115,17 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-wake",
         ],
     ),
+    // What a ranger reads is of the boards' curve.
+    (
+        "lager-commission",
+        &[
+            "lager-control",
+            "lager-operator",
+            "lager-orders",
+            "lager-topics",
+            "lager-wire",
+        ],
+    ),
     // The common code of comm, the command line and `up` for requests to the robot.
     (
         "lager-operator",
@@ -234,6 +245,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-bridge",
             "lager-battery",
             "lager-comm",
+            "lager-commission",
             "lager-gateway",
             "lager-home",
             "lager-lines",

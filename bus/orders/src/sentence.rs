@@ -27,7 +27,12 @@ pub struct Sentence {
 impl Sentence {
     /// Every sentence, in the order of the table.
     pub fn all() -> impl Iterator<Item = Self> {
-        let mut lines = TABLE
+        Self::in_table(TABLE)
+    }
+
+    /// Every sentence of another table of the same form, in its order.
+    pub fn in_table(table: &'static str) -> impl Iterator<Item = Self> {
+        let mut lines = table
             .lines()
             .filter(|line| !line.is_empty() && !line.starts_with('#'));
         core::iter::from_fn(move || {

@@ -13,6 +13,12 @@ use crate::world::{Snapshot, World};
 pub enum Hand {
     /// Lifts the robot and puts it here, at rest.
     Place(Pose),
+    /// Lifts the robot and holds it, until it is put somewhere.
+    Lift,
+    /// Holds something wide so many cm in front of the ranger, until the robot is put somewhere.
+    Hold(u8),
+    /// Puts the robot down so many mm to the left of where it stands.
+    Shift(i16),
     /// Puts a thing on this edge.
     Put(Edge),
     /// Takes the thing on this edge away.
@@ -28,6 +34,20 @@ impl Hand {
         match self {
             Self::Place(pose) => {
                 world.place(pose);
+                Ok(())
+            }
+            Self::Lift => {
+                world.lift();
+                Ok(())
+            }
+            Self::Hold(cm) => {
+                world.hold_before_ranger(f64::from(cm) * 10.0);
+                Ok(())
+            }
+            Self::Shift(left) => {
+                let pose = world.pose();
+                let (x, y) = pose.point(0.0, left.into());
+                world.place(Pose { x, y, ..pose });
                 Ok(())
             }
             Self::Put(edge) => world.put_obstacle(edge),

@@ -83,6 +83,8 @@ pub struct IrRanger {
     offset: f64,
     cycle_ns: u64,
     volts: f64,
+    /// How far away somebody holds something, in mm.
+    held: Option<f64>,
     next_ns: u64,
     noise: Noise,
 }
@@ -108,6 +110,7 @@ impl IrRanger {
             },
             cycle_ns: (cycle_ms * 1e6) as u64,
             volts: NOTHING,
+            held: None,
             next_ns: 0,
             noise,
         }
@@ -118,13 +121,18 @@ impl IrRanger {
         self.model = model;
     }
 
+    /// Holds something so many mm away, or takes it away.
+    pub fn hold(&mut self, millimetres: Option<f64>) {
+        self.held = millimetres;
+    }
+
     /// Makes a measurement if one is due.
     pub fn step(&mut self, now_ns: u64, pose: &Pose, blocks: &[Block]) {
         if now_ns < self.next_ns {
             return;
         }
         self.next_ns = now_ns + self.cycle_ns;
-        let clean = match distance(pose, blocks) {
+        let clean = match self.held.or_else(|| distance(pose, blocks)) {
             Some(millimetres) => self.clean(millimetres / 10.0),
             None => NOTHING,
         };

@@ -83,6 +83,8 @@ pub struct Snapshot {
 #[derive(Clone, Debug)]
 pub struct World {
     build: Build,
+    /// Somebody holds the robot above the floor, so its wheels turn and it stays.
+    lifted: bool,
     /// What an input shows that hangs at nothing.
     floating: Noise,
     tape: Tape,
@@ -139,6 +141,7 @@ impl World {
         let positions = servos.positions();
         Ok(Self {
             build: Build::default(),
+            lifted: false,
             floating: noise(stream::INPUT),
             tape,
             blocks,
@@ -293,8 +296,20 @@ impl World {
         self.pose
     }
 
-    /// Puts the robot at a pose, at rest.
+    /// Lifts the robot off the floor, where its wheels turn freely.
+    pub fn lift(&mut self) {
+        self.lifted = true;
+    }
+
+    /// Holds something wide in front of the ranger, so far away, in mm, until the robot is put down.
+    pub fn hold_before_ranger(&mut self, millimetres: f64) {
+        self.ir.hold(Some(millimetres));
+    }
+
+    /// Puts the robot at a pose, at rest, with nothing held in front of it.
     pub fn place(&mut self, pose: Pose) {
+        self.lifted = false;
+        self.ir.hold(None);
         self.pose = pose;
         self.contact.place(pose);
         self.left.set_speed(0.0);
@@ -360,7 +375,7 @@ impl World {
         self.left.step(seconds);
         self.right.step(seconds);
         let (left, right) = (self.left.speed(), self.right.speed());
-        if left != 0.0 || right != 0.0 {
+        if !self.lifted && (left != 0.0 || right != 0.0) {
             self.pose = self.pose.moved(left, right, seconds);
             if seldom {
                 self.touch(seconds * SELDOM as f64);
@@ -452,6 +467,18 @@ mod tests {
         let (from, to) = (first.pose(), second.pose());
         let rolled = (to.x - from.x).hypot(to.y - from.y);
         assert!((1.0..15.0).contains(&rolled), "it rolls out: {rolled} mm");
+    }
+
+    #[test]
+    fn a_lifted_robot_turns_its_wheels_and_stays_until_it_is_put_down() {
+        let mut world = world(1);
+        let start = world.pose();
+        world.lift();
+        assert_eq!(drive_on(&mut world), start);
+        assert!(world.state().wheel_speeds[0] > 0.0);
+        world.place(start);
+        world.advance_to(Duration::from_secs(11));
+        assert_ne!(world.pose(), start);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod bag;
 mod board;
+mod commission;
 mod gateway;
 pub mod help;
 mod ordered;
@@ -23,6 +24,7 @@ use lager_wire::{OperatorCommand, Speed};
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 pub use board::{BoardArgs, BoardCommand, FlashArgs, PortArgs, ResetArgs, UpdateArgs};
+pub use commission::CommissionArgs;
 pub use gateway::GatewayArgs;
 pub use ordered::{Button, MapChange, ObstacleChange, Ordered, Plain, QueueChange};
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
@@ -165,6 +167,8 @@ pub enum Command {
     },
     /// Give the boards new images, restart them, or set up a new chip
     Board(BoardArgs),
+    /// Find out how a robot is built, by questions to a person who looks at it
+    Commission(CommissionArgs),
     /// Pack logs, configuration and versions into one file for a bug report, without secrets
     Report(ReportArgs),
     /// Print the configuration in force, with every key

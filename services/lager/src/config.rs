@@ -27,7 +27,7 @@ use lager_battery::Pack;
 use lager_home::UnitName;
 use lager_lines::check_names;
 use lager_orders::Pick;
-use lager_plant::{MOST_OBSTACLES, Warehouse};
+use lager_plant::{Build, MOST_OBSTACLES, Warehouse};
 use lager_ports::BusConfig;
 use lager_station::files;
 use lager_supervisor::Service;
@@ -172,9 +172,21 @@ section! {
     pub struct SimulatorSection {
         /// Seed of all noise: the same seed gives the same robot.
         pub seed: u64 = 1,
+        /// Seed of how the simulated robot is built: which motors are swapped or reversed, how fast it
+        /// is, which way round its line sensors read, which ranger it has, and whether its battery is
+        /// measured. Unset, it is built as the defaults of [wheels], [line], [distance] and [battery]
+        /// say. Another robot drives well only when somebody has described it (`lager commission`).
+        pub built: Option<u64> = None,
         /// How many things come and go on the ways of the simulated floor, at random: 0 to 64. They
         /// need squares of 50 cm or more.
         pub obstacles: u32 = 0,
+    }
+}
+
+impl SimulatorSection {
+    /// How the simulated robot is built.
+    pub fn build(&self) -> Build {
+        self.built.map_or_else(Build::default, Build::drawn)
     }
 }
 
@@ -236,6 +248,9 @@ impl Config {
                 "[serial] baud is {}; boards are built for {usual}, or for {slow} as the original ones",
                 self.serial.baud
             );
+        }
+        if self.simulator.built.is_some() && self.body == Body::Chip {
+            bail!("[simulator] built is of a simulated robot, and body is \"chip\"; leave one out");
         }
         if self.simulator.obstacles as usize > MOST_OBSTACLES {
             bail!(

@@ -12,6 +12,7 @@ mod bench;
 mod board;
 mod cli;
 mod comm;
+mod commission;
 mod config;
 mod diagnose;
 mod doctor;
@@ -192,6 +193,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                     let simulator = SimulatorConfig {
                         warehouse: config.simulated_warehouse()?,
                         seed: config.simulator.seed,
+                        build: config.simulator.build(),
                         obstacles: config.simulator.obstacles,
                         baud: config.serial.baud,
                         sensor_link: config.serial.sensor.clone(),
@@ -275,6 +277,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             board::run(&config, &args, &shutdown)?;
             return Ok(ExitCode::SUCCESS);
         }
+        Command::Commission(args) => return commission::run(&config, &args, &shutdown),
         Command::Doctor {
             fix,
             json,

@@ -187,6 +187,9 @@ struct Whole {
     /// The bytes on the wires, for the tests that repeat a run.
     #[cfg(test)]
     tape: taped::Tape,
+    /// What a person finds out about the robot, for the tests that commission it.
+    #[cfg(test)]
+    wizard: Option<commissioned::Wizard>,
 }
 
 impl Whole {
@@ -243,6 +246,8 @@ impl Whole {
             bytes: Vec::new(),
             #[cfg(test)]
             tape: taped::Tape::default(),
+            #[cfg(test)]
+            wizard: None,
         };
         whole.tell_logic(Input::Map(&map));
         Ok(whole)
@@ -343,6 +348,8 @@ impl Whole {
         match heard {
             Heard::Line(frame) => {
                 self.frames += 1;
+                #[cfg(test)]
+                self.with_wizard(|wizard, now| wizard.line(now.robot, frame.bits));
                 if let Some(state) = frame.state.get() {
                     self.tell_logic(Input::Line(state));
                 }
@@ -351,6 +358,8 @@ impl Whole {
                 self.frames += 1;
                 #[cfg(test)]
                 self.tape.measured(frame.distance_cm);
+                #[cfg(test)]
+                self.with_wizard(|wizard, now| wizard.distance(now.robot, frame.distance_cm));
                 self.tell_logic(Input::Distance(frame.distance_cm));
             }
             Heard::Event(event) => {
@@ -377,7 +386,11 @@ impl Whole {
             self.bridge.decide(self.now);
             self.act();
             // The sender of the request sees the answer in `link/health`.
-            let _ = self.bridge.answer();
+            let _answer = self.bridge.answer();
+            #[cfg(test)]
+            if let Some(answer) = _answer {
+                self.wizard_hears(&answer);
+            }
         }
     }
 
@@ -414,6 +427,8 @@ impl Whole {
         self.bridge.fill_health(self.now, &self.counts, &mut health);
         self.bridge.health_told();
         self.seen.health = Some(health);
+        #[cfg(test)]
+        self.with_wizard(|wizard, now| wizard.health(now, &health));
         for input in self.known_health.news(&health) {
             self.tell_logic(input);
         }
@@ -423,6 +438,8 @@ impl Whole {
         let mut report = SteeringReport::default();
         self.bridge.fill_state(self.now, &mut report);
         self.bridge.state_told(&report);
+        #[cfg(test)]
+        self.with_wizard(|wizard, now| wizard.reported(now.robot, &report));
         self.tell_logic(Input::Steering(&report));
     }
 
@@ -506,6 +523,8 @@ impl Whole {
 mod boards;
 #[cfg(test)]
 mod built;
+#[cfg(test)]
+mod commissioned;
 #[cfg(test)]
 mod disturbed;
 #[cfg(test)]

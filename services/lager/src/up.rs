@@ -4,6 +4,7 @@
 
 mod external;
 
+use std::path;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -36,6 +37,9 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     apply(&mut config, args)?;
     config.describe()?;
     config.validate()?;
+    // Tools find these again in whatever folder and environment they run.
+    config.state = Some(config.state_root()?);
+    config.robot = config.robot.as_ref().map(path::absolute).transpose()?;
     let state = StateFolder::of_robot(&config.state_root()?, &config.name);
     let mut notes = choose_warehouse(&mut config, &state)?;
     let products = products(&config, args)?;

@@ -18,7 +18,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use lager_home::Clock;
-use lager_plant::{Warehouse, WarehouseError, World};
+use lager_plant::{Build, Warehouse, WarehouseError, World};
 use lager_ports::{Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, SendError, Server};
 use lager_pty::{Port, PtyError};
 use lager_topics::{TruthPose, WorldRequest};
@@ -44,6 +44,8 @@ pub struct SimulatorConfig {
     pub warehouse: Warehouse,
     /// The seed of every imperfection.
     pub seed: u64,
+    /// How the robot is built.
+    pub build: Build,
     /// The number of things that come and go on the edges.
     pub obstacles: u32,
     /// Baud rate of both serial lines.
@@ -88,6 +90,7 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
     };
     let options = RobotOptions {
         seed: config.seed,
+        build: config.build,
         obstacles: config.obstacles,
         baud: config.baud,
         ..RobotOptions::default()

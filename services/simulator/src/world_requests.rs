@@ -26,6 +26,9 @@ pub fn wish(warehouse: &Warehouse, ask: &WorldAsk) -> Result<Hand, WorldAnswer> 
             WorldAskKind::Place => pose_at(warehouse, at).map(Hand::Place),
             WorldAskKind::Put => edge(warehouse, at).map(Hand::Put),
             WorldAskKind::Take => edge(warehouse, at).map(Hand::Take),
+            WorldAskKind::Lift => Some(Hand::Lift),
+            WorldAskKind::Hold => Some(Hand::Hold(ask.x)),
+            WorldAskKind::Shift => Some(Hand::Shift(i16::from(ask.x) - 128)),
         }
     };
     wanted().ok_or_else(|| refused(WorldRefusal::NoPlace))

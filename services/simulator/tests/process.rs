@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use lager_plant::Warehouse;
+use lager_plant::{Build, Warehouse};
 use lager_ports::{Bus, BusConfig};
 use lager_rig::{Domain, Host};
 use lager_simulator::{RunError, SimulatorConfig};
@@ -33,6 +33,7 @@ impl OwnBus {
 
     fn config(&self, resume: bool) -> SimulatorConfig {
         SimulatorConfig {
+            build: Build::default(),
             warehouse: Warehouse::builtin("large").unwrap(),
             seed: 5,
             obstacles: 0,

@@ -181,6 +181,12 @@ coded! {
         Put = 1,
         /// Take the thing on that edge away.
         Take = 2,
+        /// Lift the robot off the floor and hold it, until it is put on a node.
+        Lift = 3,
+        /// Hold something wide `x` cm in front of the ranger, until the robot is put on a node.
+        Hold = 4,
+        /// Put the robot down `x` - 128 mm to the left of where it stands.
+        Shift = 5,
     }
 }
 
@@ -224,7 +230,7 @@ payload! {
         pub lifetime_ms: u32,
         /// What the hands do.
         pub kind: Tag<WorldAskKind>,
-        /// Column of the node.
+        /// Column of the node, or a length.
         pub x: u8,
         /// Row of the node.
         pub y: u8,

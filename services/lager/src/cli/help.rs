@@ -22,6 +22,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     (
         "Set up and mend",
         &[
+            "commission",
             "doctor",
             "board",
             "report",

@@ -21,9 +21,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
+use lager_commission::Built;
 use lager_station::files;
 use lager_supervisor::state_folder::StateFolder;
-use lager_wire::{ArmProfile, IrModel, LineProfile, RangerProfile, WheelsProfile};
+use lager_wire::{ArmProfile, IrModel, LineProfile, RangerProfile, RobotProfile, WheelsProfile};
 use serde::{Deserialize, Serialize};
 
 use super::invalid;
@@ -88,6 +89,26 @@ impl Config {
         take(&mut self.buttons, file.buttons, "buttons", path)
     }
 
+    /// How this robot is built, as far as commissioning finds it out.
+    pub fn commissioned(&self) -> Built {
+        Built {
+            robot: self.robot(),
+            cruise_mm_per_s: self.logic.cruise_mm_per_s,
+        }
+    }
+
+    /// Takes over what commissioning has found out.
+    pub fn take_commissioned(&mut self, built: &Built) {
+        let RobotProfile {
+            steering, sensors, ..
+        } = built.robot;
+        self.wheels = steering.wheels;
+        self.battery.divider = Some(steering.divider);
+        self.line = sensors.line;
+        self.distance = sensors.ranger;
+        self.logic.cruise_mm_per_s = built.cruise_mm_per_s;
+    }
+
     /// Writes how this robot is built into its file, whose earlier text
     /// [`Config::forget_description`] brings back. `configured` is what the configuration says
     /// without that file. Returns the file.
@@ -138,7 +159,7 @@ impl Config {
     }
 
     /// Where the description of this robot is, or would be.
-    fn place_of_description(&self) -> Result<PathBuf> {
+    pub fn place_of_description(&self) -> Result<PathBuf> {
         match (&self.robot, self.body) {
             (Some(named), _) => Ok(named.clone()),
             (None, Body::Serial) => {

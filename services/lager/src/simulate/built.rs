@@ -15,7 +15,7 @@ use super::Whole;
 use crate::config::{BatterySection, Config};
 
 /// Virtual time in which a mission must be over.
-const LIMIT: Duration = Duration::from_secs(600);
+pub(super) const LIMIT: Duration = Duration::from_secs(600);
 
 /// What a person who knows the robot writes into its description.
 fn described(build: &Build) -> Config {
@@ -49,7 +49,7 @@ fn described(build: &Build) -> Config {
 }
 
 /// What a person who has found the ids and the directions of the servos writes.
-fn described_arm(arm: &ArmBuild) -> ArmProfile {
+pub(super) fn described_arm(arm: &ArmBuild) -> ArmProfile {
     let id = |index: usize| arm.ids[index].expect("every joint has a first servo");
     let joint = |first: usize| match arm.ids[first + 1] {
         Some(second) => OneOrTwo::Two([id(first), second]),
@@ -77,7 +77,7 @@ fn described_arm(arm: &ArmBuild) -> ArmProfile {
     }
 }
 
-fn robot(config: &Config, build: Build, seed: u64) -> Whole {
+pub(super) fn robot(config: &Config, build: Build, seed: u64) -> Whole {
     let warehouse = Warehouse::builtin("small").expect("built in");
     let options = RobotOptions {
         seed,
@@ -87,7 +87,7 @@ fn robot(config: &Config, build: Build, seed: u64) -> Whole {
     Whole::of(config, &warehouse, &[1], options).expect("a robot")
 }
 
-fn seeds() -> std::ops::RangeInclusive<u64> {
+pub(super) fn seeds() -> std::ops::RangeInclusive<u64> {
     let seeds = std::env::var("LAGER_SEEDS").map_or(20, |seeds| seeds.parse().expect("a number"));
     1..=seeds
 }

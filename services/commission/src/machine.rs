@@ -1,0 +1,548 @@
+//! [`Commissioning`]: the steps one after the other, and everything that can end one.
+//!
+//! ```text
+//!            answer                      the boards obey it
+//!    asks ──────────> the description ──────────────────────> asks the next question
+//!     │  ^             is tried
+//!     │  '───────────────────────────────────────┐
+//!     │ answer "lifted", "go"                    │ half a second, or the person's next answer
+//!     '────────────────────> the wheels turn ────┘
+//! ```
+//!
+//! In every state a failure ends the step: the robot stands, what held before the step holds again,
+//! and the step begins anew with a sentence that says why.
+
+mod answers;
+mod shown;
+
+use core::time::Duration;
+
+use lager_operator::{Driving, For, Ids, Seen};
+use lager_orders::{Moment, Reason};
+use lager_topics::{
+    Calibration, Health, Outcome, Part, ProfileState, SteeringOrder, SteeringReport,
+};
+use lager_wire::{Centimetres, LineBits, OperatorCommand, RobotProfile};
+
+use crate::answer::{Answer, Way};
+use crate::range::{MEASURING, Point};
+use crate::recent::Recent;
+use crate::step::{Question, Step};
+use crate::words::Said;
+use crate::{line, range, wheels};
+
+/// How long the wheels turn when they are lifted.
+const PULSE: Duration = Duration::from_millis(500);
+/// How long the steering board may take to begin a movement.
+const BEGIN: Duration = Duration::from_secs(1);
+/// How long the boards may take to obey a description.
+const TELL: Duration = Duration::from_secs(5);
+/// A description that was refused is told again after this time: the wheels may just have stopped.
+const RETRY: Duration = Duration::from_millis(200);
+/// How long a calibration may take; the board watches its sensors for 5 s.
+const CALIBRATE: Duration = Duration::from_secs(8);
+/// The longest movement that waits for an answer.
+const LONGEST: Duration = Duration::from_secs(60);
+/// Without a new `link/health` for this long, nobody knows how the boards are.
+const UNHEARD: Duration = Duration::from_secs(2);
+/// The parts of the description that are found out.
+const TOLD: [Part; 2] = [Part::Steering, Part::Sensors];
+
+/// How a robot is built, as far as commissioning finds it out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Built {
+    /// What the boards are told.
+    pub robot: RobotProfile,
+    /// The speed with both motors at their duty, in mm/s.
+    pub cruise_mm_per_s: f32,
+}
+
+/// Something that the caller must do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Effect {
+    /// Ask the bridge to have this part told as the robot's, and hand its answer in
+    /// ([`Commissioning::described`]).
+    Describe(Part, RobotProfile),
+    /// Publish an order to the wheels.
+    Steer(SteeringOrder),
+    /// Let the sensor board calibrate its line sensors.
+    Calibrate,
+    /// Save this for good.
+    Keep(Built),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    /// Waits for an answer.
+    Asks,
+    /// The boards are told a description; the next request is due at a time, or under way.
+    Tells {
+        since: Duration,
+        due: Option<Duration>,
+    },
+    /// The sensor board watches its line sensors.
+    Calibrates { since: Duration, ended_before: u8 },
+    /// The wheels turn, until a time after their beginning or until the next answer.
+    Moves {
+        since: Duration,
+        begun: Option<Duration>,
+        is_pulse: bool,
+    },
+    /// Everything is said.
+    Over,
+}
+
+/// What the present step has found out so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    floor: u16,
+    far: Point,
+    ahead: Option<[Way; 2]>,
+    length_mm: f32,
+}
+
+/// A commissioning.
+#[derive(Clone, Debug)]
+pub struct Commissioning {
+    state: State,
+    question: Question,
+    step: Step,
+    built: Built,
+    /// What held before each step.
+    before: [Built; Step::ALL.len()],
+    /// What held before all of them.
+    original: Built,
+    /// What the boards shall obey.
+    wanted: RobotProfile,
+    /// What they obey of it; `None` if nobody knows.
+    told: [Option<RobotProfile>; TOLD.len()],
+    /// What the bridge was asked to tell, and has not answered yet.
+    under_way: Option<RobotProfile>,
+    /// The hash of it in `link/health`, once that has come.
+    description: Option<u32>,
+    /// The person ends it, and the boards are told what they were told before.
+    is_leaving: bool,
+    found: Found,
+    health: Option<(Duration, Health)>,
+    /// The lives of both links since the step began.
+    epochs: Option<[u32; 2]>,
+    report: Option<SteeringReport>,
+    bits: Recent<u16>,
+    readings: Recent<u16>,
+    volts: Recent<u8>,
+    driving: Driving,
+    ids: Ids,
+    effects: Vec<Effect>,
+    said: Vec<Said>,
+}
+
+impl Commissioning {
+    /// Begins with the boards, of a robot that is described so.
+    pub fn new(built: Built) -> Self {
+        Self {
+            state: State::Asks,
+            question: Question::Boards,
+            step: Step::Boards,
+            built,
+            before: [built; Step::ALL.len()],
+            original: built,
+            wanted: built.robot,
+            told: [None; TOLD.len()],
+            under_way: None,
+            description: None,
+            is_leaving: false,
+            found: Found::default(),
+            health: None,
+            epochs: None,
+            report: None,
+            bits: Recent::default(),
+            readings: Recent::default(),
+            volts: Recent::default(),
+            driving: Driving::default(),
+            ids: Ids::default(),
+            effects: Vec::new(),
+            said: Vec::new(),
+        }
+    }
+
+    /// The present step.
+    pub const fn step(&self) -> Step {
+        self.step
+    }
+
+    /// What is asked now; `None` while something must happen first, or when all is over.
+    pub fn question(&self) -> Option<Question> {
+        match self.state {
+            State::Asks
+            | State::Moves {
+                is_pulse: false, ..
+            } => Some(self.question),
+            _ => None,
+        }
+    }
+
+    /// Whether it has ended.
+    pub fn is_over(&self) -> bool {
+        self.state == State::Over
+    }
+
+    /// Whether it lets the robot move at present.
+    pub const fn moves(&self) -> bool {
+        self.driving.is_running()
+    }
+
+    /// How the robot is built, by what is known so far.
+    pub const fn built(&self) -> Built {
+        self.built
+    }
+
+    /// Takes the list of things to do.
+    pub fn effects(&mut self) -> Vec<Effect> {
+        core::mem::take(&mut self.effects)
+    }
+
+    /// Takes what there is to say: results, and why something does not go on.
+    pub fn said(&mut self) -> Vec<Said> {
+        core::mem::take(&mut self.said)
+    }
+}
+
+/// What the robot tells.
+impl Commissioning {
+    /// To be called with each `link/health`.
+    pub fn health(&mut self, now: Moment, health: &Health) {
+        self.health = Some((now.robot, *health));
+        self.driving.refused(now.robot, health);
+        let epochs = [health.sensor.epoch, health.steering.epoch];
+        let up = [health.sensor.up, health.steering.up];
+        if self.step == Step::Boards || self.state == State::Over {
+            return;
+        }
+        let is_told_otherwise = self
+            .description
+            .is_some_and(|told| told != health.description);
+        if is_told_otherwise {
+            self.told = [None; TOLD.len()];
+        }
+        let has_changed = self.epochs.is_some_and(|before| before != epochs);
+        if up.contains(&0) || has_changed || is_told_otherwise {
+            return self.fall_back(now, "board_changed");
+        }
+        self.epochs = Some(epochs);
+        if !matches!(self.state, State::Tells { .. }) {
+            self.description = Some(health.description);
+        }
+        if let State::Calibrates { ended_before, .. } = self.state
+            && health.calibrations_ended != ended_before
+        {
+            match (health.calibration_failure(), line::dull(health)) {
+                (None, _) => self.ask(Question::LineFloor),
+                (Some(_), Some(dull)) if health.calibration == Calibration::Partly => {
+                    self.fail(now, dull);
+                }
+                (Some(why), _) => self.fail(now, why),
+            }
+        }
+    }
+
+    /// To be called with the bridge's answer to [`Effect::Describe`]; `None` if there was none.
+    pub fn described(&mut self, now: Moment, part: Part, outcome: Option<Outcome>) {
+        let asked = self.under_way.take();
+        let is_told = outcome == Some(Outcome::Done);
+        if let Some(told) = self.told.get_mut(part as usize) {
+            *told = asked.filter(|_| is_told);
+        }
+        let State::Tells { since, .. } = self.state else {
+            return;
+        };
+        let pause = if is_told { Duration::ZERO } else { RETRY };
+        self.state = State::Tells {
+            since,
+            due: Some(now.robot + pause),
+        };
+    }
+
+    /// To be called with the bridge's answer to [`Effect::Calibrate`]; `None` if there was none.
+    pub fn calibrates(&mut self, now: Moment, outcome: Option<Outcome>) {
+        match outcome {
+            Some(Outcome::Done) => {}
+            Some(why) => self.fail(now, Reason::from(why)),
+            None => self.fail(now, "bridge_silent"),
+        }
+    }
+
+    /// To be called with the line sensors' bits of each frame.
+    pub fn line(&mut self, now: Duration, bits: u16) {
+        if bits & !LineBits::MASK == 0 {
+            self.bits.push(now, bits);
+        }
+    }
+
+    /// To be called with each distance, in cm.
+    pub fn distance(&mut self, now: Duration, cm: u8) {
+        let told = Centimetres(cm).get();
+        self.readings.push(now, told.map_or(0, range::reading));
+    }
+
+    /// To be called with each `steering/state`.
+    pub fn reported(&mut self, now: Duration, report: &SteeringReport) {
+        if report.age_ms == 0 {
+            self.volts.push(now, report.battery_decivolts);
+        }
+        self.report = Some(*report);
+        self.driving.reported(now, report);
+        if let State::Moves { begun, .. } = &mut self.state
+            && begun.is_none()
+            && self.driving.has_begun()
+        {
+            *begun = Some(now);
+        }
+    }
+
+    /// To be called at least every 10 ms.
+    pub fn turn(&mut self, now: Moment) {
+        if let Some(order) = self.driving.renew(now.robot) {
+            self.effects.push(Effect::Steer(order));
+        }
+        if let Some(Err(why)) = self.driving.ended().pop().map(|ended| ended.result) {
+            return self.fail(now, why);
+        }
+        let is_busy = !matches!(self.state, State::Asks | State::Over);
+        if is_busy && !self.is_leaving && self.known(now.robot).is_none() {
+            return self.fall_back(now, "bridge_silent");
+        }
+        let past = |since: Duration, span| now.robot >= since + span;
+        match self.state {
+            State::Tells { since, .. } if past(since, TELL) => self.undescribed(now),
+            State::Tells {
+                since,
+                due: Some(due),
+            } if due <= now.robot => self.tell_next(since),
+            State::Calibrates { since, .. } if past(since, CALIBRATE) => {
+                self.fail(now, Reason::from(lager_orders::Code::CalibrationSilent));
+            }
+            State::Moves {
+                since, begun: None, ..
+            } if past(since, BEGIN) => self.fail(now, "unmoved"),
+            State::Moves {
+                begun: Some(begun),
+                is_pulse: true,
+                ..
+            } if past(begun, PULSE) => {
+                self.stand(now);
+                self.ask(match self.question {
+                    Question::WheelsAhead => Question::SawAhead,
+                    _ => Question::SawLeft,
+                });
+            }
+            State::Moves { since, .. } if past(since, LONGEST) => {
+                let seconds = LONGEST.as_secs();
+                self.fail(now, Said::new("too_long", &[("seconds", &seconds)]));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What the person says.
+impl Commissioning {
+    /// Takes an answer.
+    pub fn answer(&mut self, now: Moment, answer: Answer) {
+        match (answer, self.state) {
+            (_, State::Over) => {}
+            (Answer::Again, _) => self.enter(now, self.step),
+            (Answer::Skip, _) => self.enter_unchanged(now, self.step.next()),
+            (Answer::Back, _) => self.enter(now, self.step.before()),
+            (_, State::Asks) => {
+                if let Err(why) = self.answered(now, answer) {
+                    self.fail(now, why);
+                }
+            }
+            (
+                Answer::Yes,
+                State::Moves {
+                    begun: Some(begun),
+                    is_pulse: false,
+                    ..
+                },
+            ) => {
+                self.stand(now);
+                if let Err(why) = self.measured(now, now.robot.saturating_sub(begun)) {
+                    self.fail(now, why);
+                }
+            }
+            // Whatever a person types while the robot moves, he wants it to stand.
+            (_, State::Moves { .. }) => self.fail(now, "broken_off"),
+            (_, State::Tells { .. } | State::Calibrates { .. }) => self.said.push("wait".into()),
+        }
+    }
+
+    /// Ends it: the robot stands, and the boards obey what they obeyed before.
+    pub fn quit(&mut self, now: Moment) {
+        self.stand(now);
+        self.built = self.original;
+        self.is_leaving = true;
+        self.state = State::Over;
+        // Without a first answer nothing was tried.
+        if self.told != [None; TOLD.len()] {
+            self.tell(now, self.built.robot);
+        }
+    }
+
+    /// `link/health`, if it is new.
+    fn known(&self, now: Duration) -> Option<&Health> {
+        let (at, health) = self.health.as_ref()?;
+        (*at + UNHEARD > now).then_some(health)
+    }
+}
+
+/// How it goes from one state to the next.
+impl Commissioning {
+    fn ask(&mut self, question: Question) {
+        self.question = question;
+        self.state = State::Asks;
+    }
+
+    /// The step has a result.
+    fn done(&mut self, now: Moment, result: impl Into<Said>) {
+        self.said.push(result.into());
+        let next = self.step.next();
+        self.before[next as usize] = self.built;
+        self.enter(now, next);
+    }
+
+    /// Leaves the step without a result.
+    fn enter_unchanged(&mut self, now: Moment, next: Step) {
+        let built = self.before[self.step as usize];
+        self.before[next as usize] = built;
+        self.enter(now, next);
+    }
+
+    /// Begins a step with what held before it.
+    fn enter(&mut self, now: Moment, step: Step) {
+        self.stand(now);
+        self.step = step;
+        self.found = Found::default();
+        self.epochs = None;
+        self.built = self.before[step as usize];
+        self.ask(step.first());
+        if step == Step::Boards {
+            return;
+        }
+        let mut trial = self.built.robot;
+        match step {
+            Step::Distance => trial.sensors.ranger = MEASURING,
+            Step::Wheels => trial.steering.wheels = wheels::plain(trial.steering.wheels),
+            Step::Battery => trial.steering.divider = true,
+            _ => {}
+        }
+        self.tell(now, trial);
+    }
+
+    /// Lets the boards obey a description.
+    fn tell(&mut self, now: Moment, robot: RobotProfile) {
+        self.wanted = robot;
+        self.description = None;
+        self.state = State::Tells {
+            since: now.robot,
+            due: Some(now.robot),
+        };
+        self.tell_next(now.robot);
+    }
+
+    /// Tells the next part that a board does not obey yet, one at a time.
+    fn tell_next(&mut self, since: Duration) {
+        if self.under_way.is_some() {
+            self.state = State::Tells { since, due: None };
+            return;
+        }
+        let is_open = |part: &Part| match (part, self.told[*part as usize]) {
+            (_, None) => true,
+            (Part::Steering, Some(told)) => told.steering != self.wanted.steering,
+            (_, Some(told)) => told.sensors != self.wanted.sensors,
+        };
+        if let Some(part) = TOLD.into_iter().find(is_open) {
+            self.under_way = Some(self.wanted);
+            self.effects.push(Effect::Describe(part, self.wanted));
+            self.state = State::Tells { since, due: None };
+            return;
+        }
+        // Of what came before nobody knows by which description it was made.
+        self.bits.clear();
+        self.readings.clear();
+        self.volts.clear();
+        self.state = if self.is_leaving {
+            State::Over
+        } else {
+            State::Asks
+        };
+    }
+
+    /// A board does not take a description.
+    fn undescribed(&mut self, now: Moment) {
+        self.told = [None; TOLD.len()];
+        self.under_way = None;
+        if self.is_leaving {
+            self.said.push("undescribed".into());
+            self.state = State::Over;
+        } else {
+            self.fall_back(now, "undescribed");
+        }
+    }
+
+    /// Ends the step, which begins anew.
+    fn fail(&mut self, now: Moment, why: impl Into<Said>) {
+        self.said.push(Said::of("ended", [("why", why.into())]));
+        self.enter(now, self.step);
+    }
+
+    /// A board has gone, or nobody knows how it is: the person looks at the boards first.
+    fn fall_back(&mut self, now: Moment, why: &'static str) {
+        self.stand(now);
+        self.said.push(Said::of("ended", [("why", why.into())]));
+        self.built = self.before[self.step as usize];
+        self.before[Step::Boards as usize] = self.built;
+        self.step = Step::Boards;
+        self.ask(Question::Boards);
+    }
+
+    fn begin(&mut self, now: Moment, command: OperatorCommand, is_pulse: bool) -> Result<(), Said> {
+        let health = self.known(now.robot).ok_or("bridge_silent")?;
+        let seen = Seen {
+            health: Some(*health),
+            ..Seen::default()
+        };
+        seen.may_move(command)?;
+        self.steer(now, command);
+        self.state = State::Moves {
+            since: now.robot,
+            begun: None,
+            is_pulse,
+        };
+        Ok(())
+    }
+
+    /// Stands, if it does not yet.
+    fn stand(&mut self, now: Moment) {
+        if self.driving.is_running() {
+            self.steer(now, OperatorCommand::Stop);
+            self.driving.let_go(lager_orders::Code::Replaced);
+            self.driving.ended();
+        }
+    }
+
+    fn steer(&mut self, now: Moment, command: OperatorCommand) {
+        let id = self.ids.fresh(now.ns);
+        let whose = For::Question;
+        let order = self.driving.begin(now, Duration::ZERO, id, command, whose);
+        self.driving.ended();
+        self.effects.push(Effect::Steer(order));
+    }
+}
+
+/// Whether both boards obey what they were told.
+fn is_obeyed(health: &Health) -> bool {
+    [health.steering_profile, health.sensor_profile]
+        .iter()
+        .all(|told| *told == ProfileState::Accepted)
+}
