@@ -27,7 +27,7 @@ impl Boards {
     fn new(domain: &Domain) -> Self {
         let at = |name: &str| domain.folder().join(name);
         let image = |name: &str| in_tree(IMAGES).join(name);
-        let (sensor, steering) = (at("sensor"), at("steering"));
+        let (sensor, steering) = (at("ttyUSB1"), at("ttyUSB0"));
         let chips = Command::new(lager_tests::emulator())
             .arg("--sensor-elf")
             .arg(image("sensor.elf"))
@@ -48,10 +48,10 @@ impl Boards {
             .spawn()
             .expect("the emulator starts");
         let config = at("lager.toml");
-        // The boards say who they are: the names of the ports are the wrong way round.
+        // Nobody names the ports: the boards say who they are.
         let text = format!(
-            "body = \"serial\"\n[serial]\nsensor = {steering:?}\nsteering = {sensor:?}\n\
-             [chip]\nclock = {:?}\n",
+            "body = \"serial\"\n[serial]\ndevices = {:?}\n[chip]\nclock = {:?}\n",
+            domain.folder(),
             at("clock")
         );
         fs::write(&config, text).expect("a file");

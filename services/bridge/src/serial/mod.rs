@@ -7,6 +7,8 @@
 //! A pseudo terminal works like a real port: modem lines are ignored, and the driver's low-latency
 //! mode helps but is not necessary.
 
+pub mod find;
+pub mod holders;
 mod low_latency;
 
 use std::fmt;
@@ -19,8 +21,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{FlockOperation, Mode, OFlags, fcntl_setfl, flock, fstat, major, open};
 use rustix::io::Errno;
 use rustix::termios::{
-    ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, ioctl_tiocexcl,
-    tcflush, tcgetattr, tcsetattr,
+    ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, Termios,
+    ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
 };
 
 /// Why a port cannot be opened, and what to do.
@@ -109,9 +111,12 @@ pub enum Sent {
 /// It is opened twice. A read may sleep, so that waiting and reading are one system call. A write
 /// must not sleep.
 pub struct SerialPort {
+    path: PathBuf,
     reading: OwnedFd,
     writing: OwnedFd,
     low_latency: bool,
+    /// What was set before.
+    former: Termios,
 }
 
 /// How long the driver lets a read sleep, in tenths of a second.
@@ -121,6 +126,7 @@ const READ: Duration = Duration::from_millis(100 * READ_TENTHS as u64);
 impl fmt::Debug for SerialPort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("SerialPort")
+            .field("path", &self.path)
             .field("low_latency", &self.low_latency)
             .finish_non_exhaustive()
     }
@@ -138,6 +144,7 @@ impl SerialPort {
         let writing = open(path, flags, Mode::empty()).map_err(fail)?;
         let mut termios = tcgetattr(&writing).map_err(fail)?;
         lock(&writing).map_err(fail)?;
+        let former = termios.clone();
 
         termios.make_raw();
         termios.input_modes &= !(InputModes::IXOFF | InputModes::IXANY | InputModes::INPCK);
@@ -172,10 +179,23 @@ impl SerialPort {
         shut_out_others(&writing).map_err(fail)?;
         tcflush(&writing, QueueSelector::IOFlush).map_err(fail)?;
         Ok(Self {
+            path: path.to_owned(),
             reading,
             writing,
             low_latency,
+            former,
         })
+    }
+
+    /// The path by which it was opened.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Closes a port that is no board's, and sets it as it was.
+    pub fn put_back(self) {
+        // A device that has gone needs nothing.
+        let _ = tcsetattr(&self.writing, OptionalActions::Now, &self.former);
     }
 
     /// Whether the driver passes on bytes at once. (Some USB adapters collect them for 16 ms.)

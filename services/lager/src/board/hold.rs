@@ -15,7 +15,7 @@ use lager_supervisor::console;
 use lager_topics::{Role, StopCause};
 use lager_wake::Shutdown;
 
-use super::{BoardLine, open};
+use super::{BoardLine, find, open};
 use crate::config::Config;
 use crate::exit::InUse;
 use crate::stop;
@@ -81,6 +81,28 @@ impl Hold {
             let waits = self.taken.is_none() && is_busy && start.elapsed() < LETS_GO;
             if !waits || shutdown.is_requested() {
                 return opened;
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// Finds the ports of both boards, as soon as the bridge has let go of them.
+    ///
+    /// # Errors
+    /// A board was not found.
+    pub fn find(
+        &self,
+        config: &Config,
+        baud: Option<u32>,
+        shutdown: &Shutdown,
+    ) -> Result<Vec<PathBuf>> {
+        let start = Instant::now();
+        loop {
+            let [sensor, steering] = find(config, baud, shutdown)?;
+            let found = sensor.and_then(|sensor| Ok(vec![sensor, steering?]));
+            let waits = self.taken.is_none() && found.is_err() && start.elapsed() < LETS_GO;
+            if !waits || shutdown.is_requested() {
+                return found.context("name the ports of the boards with --port");
             }
             std::thread::sleep(LOOK);
         }
