@@ -5,7 +5,7 @@
 //! nothing of packets.
 //!
 //! A pseudo terminal works like a real port: modem lines are ignored, and the driver's low-latency
-//! mode helps but is not necessary.
+//! mode helps but is not necessary. It needs no speed, so one that cannot be set hinders nothing.
 
 pub mod find;
 pub mod holders;
@@ -168,7 +168,7 @@ impl SerialPort {
         tcsetattr(&writing, OptionalActions::Now, &termios).map_err(fail)?;
         // The driver says which speed it has really set.
         let set = tcgetattr(&writing).map_err(fail)?.output_speed();
-        if set.abs_diff(baud) > baud / 50 {
+        if !will_do(set, baud, is_pty(&writing).map_err(fail)?) {
             return Err(no_such_speed(Errno::INVAL));
         }
         let low_latency = low_latency::request(&writing);
@@ -259,11 +259,21 @@ fn lock(fd: &OwnedFd) -> Result<(), Errno> {
 /// Keeps out programs that ask for no lock (TIOCEXCL). Not on a pseudo terminal: there it would
 /// outlive a killed process while the other end is open, and shut out the next bridge.
 fn shut_out_others(fd: &OwnedFd) -> Result<(), Errno> {
-    let is_pty = PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev));
-    if !is_pty {
+    if !is_pty(fd)? {
         ioctl_tiocexcl(fd)?;
     }
     Ok(())
+}
+
+/// Whether a port does for `baud` whose driver has set the speed `set`. An adapter has to come near; a
+/// pseudo terminal carries bytes at any speed, and an emulator of programs cannot set one.
+const fn will_do(set: u32, baud: u32, is_pty: bool) -> bool {
+    is_pty || set.abs_diff(baud) <= baud / 50
+}
+
+/// Whether it is the slave end of a pseudo terminal.
+fn is_pty(fd: &OwnedFd) -> Result<bool, Errno> {
+    Ok(PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev)))
 }
 
 impl OpenPortError {
@@ -325,6 +335,19 @@ fn put(port: &SerialPort, bytes: &[u8]) -> Result<usize, PortGone> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_a_real_port_needs_the_speed_that_is_asked_for() {
+        for (set, is_real_enough) in [
+            (500_000, true),
+            (495_000, true),
+            (461_538, false),
+            (0, false),
+        ] {
+            assert_eq!(will_do(set, 500_000, false), is_real_enough, "{set}");
+            assert!(will_do(set, 500_000, true));
+        }
+    }
 
     #[test]
     fn every_refusal_of_the_system_says_what_to_do() {
