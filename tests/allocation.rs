@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use lager_bridge::BridgeConfig;
+use lager_bridge::{BridgeConfig, Ports};
 use lager_logic::LogicConfig;
 use lager_orders::Mode;
 use lager_plant::Warehouse;
@@ -51,7 +51,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
 
     std::thread::scope(|scope| {
         let bridge_config = BridgeConfig {
-            ports: ports.clone(),
+            ports: Ports::Named(ports.clone()),
             ..BridgeConfig::default()
         };
         let (shutdown, bus) = (&shutdown, &bus);

@@ -8,7 +8,6 @@ use std::process::{Child, Command, Output, Stdio};
 
 use lager_loader::{Header, Image, crc_step};
 use lager_pty::Port;
-use lager_rig::behind_ports;
 use lager_tests::{Domain, Running, in_tree, wait_for};
 use lager_topics::{Health, LinkHealth, StopCause};
 use lager_wire::{BUILD, ResetCause};
@@ -28,7 +27,7 @@ impl Boards {
     fn new(domain: &Domain) -> Self {
         let at = |name: &str| domain.folder().join(name);
         let image = |name: &str| in_tree(IMAGES).join(name);
-        let (sensor, steering) = (at("sensor"), at("steering"));
+        let (sensor, steering) = (at("ttyUSB1"), at("ttyUSB0"));
         let chips = Command::new(lager_tests::emulator())
             .arg("--sensor-elf")
             .arg(image("sensor.elf"))
@@ -49,9 +48,12 @@ impl Boards {
             .spawn()
             .expect("the emulator starts");
         let config = at("lager.toml");
-        // The boards say who they are: the names of the ports are the wrong way round.
-        let ports = behind_ports(&steering, &sensor).expect("a description");
-        let text = format!("{ports}[chip]\nclock = {:?}\n", at("clock"));
+        // Nobody names the ports: the boards say who they are.
+        let text = format!(
+            "body = \"serial\"\n[serial]\ndevices = {:?}\n[chip]\nclock = {:?}\n",
+            domain.folder(),
+            at("clock")
+        );
         fs::write(&config, text).expect("a file");
         // After power-on a board waits in its bootloader for half a second.
         wait_for("the boards' programs", || {

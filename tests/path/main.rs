@@ -13,7 +13,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
-use lager_bridge::BridgeConfig;
+use lager_bridge::{BridgeConfig, Ports};
 use lager_logic::LogicConfig;
 use lager_ports::Bus;
 use lager_rig::process::run_if_asked;
@@ -73,7 +73,7 @@ fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         ("bridge-loop", Role::Bridge),
         |bus, ports, shutdown| {
             let config = BridgeConfig {
-                ports,
+                ports: Ports::Named(ports),
                 ..BridgeConfig::default()
             };
             lager_bridge::run(bus, &config, shutdown).expect("the bridge");

@@ -214,6 +214,16 @@ fn what_moves_a_robot_is_published_beside_it_only_if_that_is_meant() {
     });
     let bridge = domain.run(&["bridge"]);
     assert_eq!(bridge.status.code(), Some(4), "{}", said(&bridge));
+    // Whoever wants to work on that robot's boards hears who is in its place, and stops nobody.
+    let boards = domain.run(&["board", "reset", "sensor", "--port", "/dev/null"]);
+    let told = said(&boards);
+    assert_eq!(boards.status.code(), Some(4), "{told}");
+    let names = format!("process {} ", tool.pid());
+    assert!(
+        told.contains(&names) && told.contains("topic pub mission/order"),
+        "{told}"
+    );
+    assert!(tool.is_running());
     tool.signal(Signal::INT);
     tool.wait();
 }

@@ -7,7 +7,7 @@ use core::time::Duration;
 use std::error::Error;
 use std::path::PathBuf;
 
-use lager_bridge::BridgeConfig;
+use lager_bridge::{BridgeConfig, Ports};
 use lager_logic::LogicConfig;
 use lager_ports::Bus;
 use lager_rig::process::Main;
@@ -62,7 +62,7 @@ fn told(parent: &mut Parent, role: Role) -> Result<(Setup, Bus), Box<dyn Error>>
 fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     let (setup, bus) = told(parent, Role::Bridge)?;
     let config = BridgeConfig {
-        ports: setup.ports,
+        ports: Ports::Named(setup.ports),
         waiting: setup.mode.policy(),
         ..BridgeConfig::default()
     };

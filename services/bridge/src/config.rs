@@ -6,13 +6,13 @@ use lager_wake::Policy;
 use lager_wire::RobotProfile;
 
 use crate::buttons::ButtonsConfig;
+use crate::serial::find::DEVICES;
 
 /// The bridge's configuration.
 #[derive(Clone, Debug)]
 pub struct BridgeConfig {
-    /// The two serial ports. It does not matter which board is at which port: the boards say who
-    /// they are (U15).
-    pub ports: [PathBuf; 2],
+    /// Where the boards are.
+    pub ports: Ports,
     /// Speed of both ports in baud: 500 000, or 9600 for boards built with the original's UBRR
     /// 103 (U17).
     pub baud: u32,
@@ -32,13 +32,20 @@ pub struct BridgeConfig {
     pub waiting: Policy,
 }
 
+/// Where the boards are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ports {
+    /// At these two serial ports. It does not matter which board is at which port: the boards say
+    /// who they are (U15).
+    Named([PathBuf; 2]),
+    /// Somewhere among the serial devices in this folder ([`crate::serial::find`]).
+    Found(PathBuf),
+}
+
 impl Default for BridgeConfig {
     fn default() -> Self {
         Self {
-            ports: [
-                PathBuf::from("/dev/lager-sensor"),
-                PathBuf::from("/dev/lager-steering"),
-            ],
+            ports: Ports::Found(DEVICES.into()),
             baud: 500_000,
             resume: false,
             raw_line: false,

@@ -15,7 +15,7 @@
 //! * [`arbiter`]: which origin may steer, as a pure state machine.
 //! * [`machine`]: every other decision of the bridge, around the arbiter and just as pure.
 //! * [`listener`]: the receiving end of one port, pure as well. `lager simulate` runs both.
-//! * [`serial`]: a port, and the errors if it cannot be opened.
+//! * [`serial`]: a port, how it is found, who else has it, and the errors if it cannot be opened.
 //! * [`frames`], [`settings`], [`profile`]: pure helpers between packets and samples.
 //! * [`loan`]: how `lager board` gets the ports while the robot is up.
 //! * [`buttons`]: the reset button and the mode switch of the robot.
@@ -49,8 +49,9 @@ mod resets;
 pub mod serial;
 mod service;
 pub mod settings;
+mod source;
 
-pub use config::BridgeConfig;
+pub use config::{BridgeConfig, Ports};
 pub use counts::Counts;
 pub use events::{BoardUp, PortEvent};
 pub use service::{BridgeError, run, run_with};

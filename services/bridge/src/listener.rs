@@ -78,6 +78,11 @@ impl Listener {
         self.link.next_due()
     }
 
+    /// Whether a board is up.
+    pub const fn is_up(&self) -> bool {
+        self.link.is_up()
+    }
+
     /// The link's counters in its present epoch.
     pub fn health(&self) -> LinkCounters {
         self.link.health()

@@ -11,8 +11,10 @@
 //!    | ^
 //!    +-+ cannot be opened: again after 20, 40, ... 250 ms, said once; or lent
 //! ```
+//!
+//! A port that nobody has named is looked for ([`Source`]), and looked for again when its board has
+//! been silent for 5 s, because its cable may be at another adapter by now.
 
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
@@ -29,7 +31,8 @@ use crate::counts::Counts;
 use crate::events::PortEvent;
 use crate::listener::{Heard, Listener};
 use crate::loan::Loan;
-use crate::serial::{OpenPortError, PortGone, SerialPort};
+use crate::serial::{PortGone, SerialPort};
+use crate::source::{NoPort, Source};
 
 /// A reader's message to the main loop: an event, and with [`PortEvent::Opened`] the port, because
 /// only the main loop writes.
@@ -41,9 +44,8 @@ pub(crate) const QUEUE: usize = 64;
 /// Longest wait for bytes in real time. The reader checks the stop flag that often.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Pauses between attempts to open a port, in real time.
+/// The first pause between attempts to open a port, in real time.
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
-const LONGEST_PAUSE: Duration = Duration::from_millis(250);
 
 /// Pause between attempts to make the sensor topics' publishers, in ns.
 const PUBLISHER_PAUSE_NS: u64 = 200_000_000;
@@ -51,7 +53,7 @@ const PUBLISHER_PAUSE_NS: u64 = 200_000_000;
 /// The reader of one port; lives in its thread.
 pub(crate) struct Reader<'a> {
     place: usize,
-    path: &'a Path,
+    source: Source<'a>,
     baud: u32,
     bus: &'a Bus,
     clock: Clock,
@@ -81,7 +83,7 @@ struct SensorPorts {
 impl<'a> Reader<'a> {
     pub(crate) fn new(
         place: usize,
-        (path, baud): (&'a Path, u32),
+        (source, baud): (Source<'a>, u32),
         bus: &'a Bus,
         events: Producer<'a, Handed>,
         ringer: Ringer,
@@ -89,7 +91,7 @@ impl<'a> Reader<'a> {
     ) -> Self {
         Self {
             place,
-            path,
+            source,
             baud,
             bus,
             clock: bus.clock(),
@@ -112,13 +114,16 @@ impl<'a> Reader<'a> {
                 self.sleep(pause);
                 continue;
             }
-            match SerialPort::open(self.path, self.baud) {
+            let goes_on = || !self.stopped() && !self.loan.is_lent();
+            match self.source.open(self.baud, &self.clock, goes_on) {
+                // Somebody wants the port, or the bridge ends.
+                _ if !goes_on() => continue,
                 Ok(port) => {
                     // The span lasts as long as the port is there. No frame is traced.
-                    let link = tracing::info_span!("link", port = %self.path.display());
+                    let link = tracing::info_span!("link", port = %port.path().display());
                     let _link = link.entered();
                     tracing::info!(
-                        port = %self.path.display(),
+                        port = %port.path().display(),
                         baud = self.baud,
                         low_latency = port.is_low_latency(),
                         "serial port opened"
@@ -129,7 +134,7 @@ impl<'a> Reader<'a> {
                     self.hand((PortEvent::Opened, Some(Arc::clone(&port))));
                     self.ringer.ring();
                     if let Err(gone) = self.listen(&port) {
-                        tracing::warn!("the serial port {}: {gone}", self.path.display());
+                        tracing::warn!("the serial port {}: {gone}", port.path().display());
                     }
                     self.sensor = SensorOut::default();
                     self.hand((PortEvent::Lost, None));
@@ -138,26 +143,32 @@ impl<'a> Reader<'a> {
                 Err(error) => self.complain(&mut complaint, error),
             }
             self.sleep(pause);
-            pause = (pause * 2).min(LONGEST_PAUSE);
+            pause = (pause * 2).min(self.source.longest_pause());
         }
     }
 
     /// Logs once why the port cannot be opened, and again when the reason changes.
-    fn complain(&self, complaint: &mut Option<OpenPortError>, error: OpenPortError) {
+    fn complain(&self, complaint: &mut Option<NoPort>, error: NoPort) {
         if complaint.as_ref() != Some(&error) {
             tracing::warn!("{error}");
             *complaint = Some(error);
         }
     }
 
-    /// Reads until the port has gone or is lent, or the bridge stops.
+    /// Reads until the port has gone, is lent or has to be looked for again, or the bridge stops.
     fn listen(&mut self, port: &SerialPort) -> Result<(), PortGone> {
         let mut listener = Listener::new(self.place);
         let mut buffer = [0; 512];
         // The moment up to which all bytes were read. A board counts as silent only up to such a
         // moment: a reader that could not run finds the bytes first and then the time.
         let mut heard = self.clock.now();
+        let mut last_up = heard;
         while !self.stopped() && !self.loan.is_lent() {
+            if listener.is_up() {
+                last_up = heard;
+            } else if self.source.gives_up(heard.saturating_sub(last_up)) {
+                return Ok(());
+            }
             let mut ring = false;
             while let Some(what) = listener.poll(heard, self.counts) {
                 ring |= self.take(what, 0);
@@ -239,10 +250,11 @@ impl<'a> Reader<'a> {
         self.end.load(Ordering::Acquire)
     }
 
-    /// Sleeps, but wakes for the stop flag.
+    /// Sleeps, but wakes for the stop flag, and for devices that come or go if the port is one of them.
     fn sleep(&self, pause: Duration) {
+        let devices = self.source.devices();
         let mut left = pause;
-        while !left.is_zero() && !self.stopped() {
+        while !left.is_zero() && !self.stopped() && devices == self.source.devices() {
             let step = left.min(LOOK);
             std::thread::sleep(step);
             left -= step;

@@ -11,7 +11,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use lager_bridge::BridgeConfig;
+use lager_bridge::{BridgeConfig, Ports};
 use lager_orders::Mode;
 use lager_ports::{Bus, Keeper};
 use lager_rig::process::run_if_asked;
@@ -45,7 +45,7 @@ fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     };
     let bus = Bus::open(&harness::bus_config(&bus), Role::Bridge).unwrap();
     let config = BridgeConfig {
-        ports: [ports.join("sensor"), ports.join("steering")],
+        ports: Ports::Named([ports.join("sensor"), ports.join("steering")]),
         resume,
         ..BridgeConfig::default()
     };

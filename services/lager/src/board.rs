@@ -15,7 +15,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
-use lager_bridge::serial::OpenPortError;
+use lager_bridge::serial::find::{self, NotFound};
+use lager_bridge::serial::{OpenPortError, holders};
 use lager_home::{Clock, ClockSource};
 use lager_loader::{Found, Image, Runs, UpdateError};
 use lager_supervisor::console;
@@ -25,7 +26,6 @@ use lager_wire::{BUILD, Callsign, Version};
 use crate::cli::{BoardArgs, BoardCommand, PortArgs, ResetArgs, UpdateArgs};
 use crate::config::{Body, Config};
 use crate::exit::{Interrupted, Usage};
-use crate::ports;
 use hold::Hold;
 pub use hold::take_robot;
 pub use line::BoardLine;
@@ -66,7 +66,9 @@ fn update(config: &Config, args: &UpdateArgs, shutdown: &Shutdown) -> Result<()>
     let images = images(config, args)?;
     let ports = ports_of(config, &args.ports)?;
     let hold = Hold::get(config)?;
-    hold.explained(update_at(config, args, (ports, &images), &hold, shutdown))?;
+    let ports = || ports.map_or_else(|| hold.find(config, args.ports.baud, shutdown), Ok);
+    let done = ports().and_then(|ports| update_at(config, args, (ports, &images), &hold, shutdown));
+    hold.explained(done)?;
     hold.end()
 }
 
@@ -170,7 +172,9 @@ fn write(board: &mut AtPort, image: &Image, path: &Path) -> Result<()> {
 fn reset(config: &Config, args: &ResetArgs, shutdown: &Shutdown) -> Result<()> {
     let ports = ports_of(config, &args.ports)?;
     let hold = Hold::get(config)?;
-    hold.explained(reset_at(config, args, ports, &hold, shutdown))?;
+    let ports = || ports.map_or_else(|| hold.find(config, args.ports.baud, shutdown), Ok);
+    let done = ports().and_then(|ports| reset_at(config, args, ports, &hold, shutdown));
+    hold.explained(done)?;
     hold.end()
 }
 
@@ -248,18 +252,21 @@ fn read(path: &Path) -> Result<ImageFile> {
     })
 }
 
-/// The ports that may have boards.
-fn ports_of(config: &Config, args: &PortArgs) -> Result<Vec<PathBuf>> {
+/// The ports that may have boards; `None` if they have to be found.
+fn ports_of(config: &Config, args: &PortArgs) -> Result<Option<Vec<PathBuf>>> {
     let ports = match args.port.as_slice() {
         [] if config.body != Body::Serial => {
             return Err(Usage(
                 "the robot of this configuration is simulated, so it has no boards; name the port \
-                 of each board with --port, or write body = \"serial\" and the ports in [serial]"
+                 of each board with --port, or write body = \"serial\" into the configuration"
                     .into(),
             )
             .into());
         }
-        [] => vec![config.serial.sensor.clone(), config.serial.steering.clone()],
+        [] => match config.serial.named() {
+            Some(ports) => ports.to_vec(),
+            None => return Ok(None),
+        },
         [_] | [_, _] => args.port.clone(),
         _ => return Err(Usage("a robot has two boards; give two ports at most".into()).into()),
     };
@@ -273,7 +280,29 @@ fn ports_of(config: &Config, args: &PortArgs) -> Result<Vec<PathBuf>> {
         ))
         .into());
     }
-    Ok(ports)
+    Ok(Some(ports))
+}
+
+/// Finds the port of each board, or says why it was not found. A silent port may be that of a board in
+/// its bootloader ([`find::both`]).
+///
+/// # Errors
+/// The boards' clock cannot be read.
+pub fn find(
+    config: &Config,
+    baud: Option<u32>,
+    shutdown: &Shutdown,
+) -> Result<[Result<PathBuf, NotFound>; 2]> {
+    let folder = &config.serial.devices;
+    let baud = baud.unwrap_or(config.serial.baud);
+    let devices = find::listen(folder, baud, &clock(config)?, || !shutdown.is_requested());
+    Ok(find::both(folder, devices))
+}
+
+/// The boards' time: the chips of an emulator that somebody runs at the ports have one of their own.
+fn clock(config: &Config) -> Result<Clock> {
+    let source = ClockSource::new(1.0, config.chip.clock.as_deref())?;
+    Ok(Clock::new(&source))
 }
 
 /// Opens a port, and says who has it if it is in use.
@@ -283,8 +312,7 @@ pub fn open(
     baud: Option<u32>,
     shutdown: &Shutdown,
 ) -> Result<BoardLine> {
-    // The chips of an emulator that somebody runs at the ports have a time of their own.
-    let clock = Clock::new(&ClockSource::new(1.0, config.chip.clock.as_deref())?);
+    let clock = clock(config)?;
     let baud = baud.unwrap_or(config.serial.baud);
     BoardLine::open(path, baud, clock, shutdown).map_err(|error| {
         let is_busy = matches!(error, OpenPortError::Busy { .. });
@@ -292,8 +320,8 @@ pub fn open(
         if !is_busy {
             return error;
         }
-        let others = ports::others(&[&path.to_owned()], &[]);
-        let said: Vec<String> = others.iter().map(ports::Other::said).collect();
+        let others = holders::others(&[&path.to_owned()], &[]);
+        let said: Vec<String> = others.iter().map(holders::Other::said).collect();
         match said.is_empty() {
             true => error.context(
                 "if the robot's service has it, give this command as the user of the service \

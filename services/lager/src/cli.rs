@@ -45,7 +45,7 @@ use crate::config::{Body, flag};
     after_help = "Examples:
   lager up                                     the simulated robot and all its services
   lager up --headless --mission 1 --exit-when-done --json
-  lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1
+  lager up --body serial                       the real boards, wherever they are plugged in
   lager up --body chip                         the boards' real images in an emulator
   lager up --realtime 20 --lock-memory --core 1
   lager simulate --seeds 1..20 --warehouse large --mission 1,2 --obstacles 4
@@ -253,7 +253,7 @@ commands that wait. Only one GaG can be connected at a time.")]
 #[command(after_help = "Examples:
   lager up                                                the simulated robot
   lager up --headless --mission 1,2 --speed 5 --exit-when-done --json
-  lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1  the boards, driven by a person
+  lager up --body serial                                  the boards, driven by a person
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1 --script --mission 1
                                                           the boards, driving by themselves
   lager up --body chip                                    their images in an emulator

@@ -24,6 +24,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
 use lager_battery::Pack;
+use lager_bridge::Ports;
+use lager_bridge::serial::find::DEVICES;
 use lager_home::UnitName;
 use lager_lines::check_names;
 use lager_orders::Pick;
@@ -147,11 +149,15 @@ section! {
 
 section! {
     "serial"
-    /// The cables to the boards.
+    /// The cables to the boards. Without names of ports, the robot listens to each serial device
+    /// (ttyUSB*, ttyACM*) that nobody uses, until both boards have said who they are. It writes to
+    /// none that has not spoken as a board.
     pub struct SerialSection {
-        /// The ports of the boards; it does not matter which board is at which port.
-        pub sensor: PathBuf = "/dev/lager-sensor".into(),
-        pub steering: PathBuf = "/dev/lager-steering".into(),
+        /// The ports of the boards, both or none; it does not matter which board is at which port.
+        pub sensor: Option<PathBuf> = None,
+        pub steering: Option<PathBuf> = None,
+        /// The folder with the serial devices, or with links to those of this robot.
+        pub devices: PathBuf = DEVICES.into(),
         /// Baud rate of both: 500000, or 9600 for boards of the original build.
         pub baud: u32 = BAUD_RATES[0],
         /// Whether the sensor board also sends which of its eleven sensors see tape, for the view
@@ -191,6 +197,23 @@ impl SimulatorSection {
 }
 
 impl SerialSection {
+    /// The ports that the configuration names; `None` if the boards have to be found.
+    pub fn named(&self) -> Option<[PathBuf; 2]> {
+        Some([self.sensor.clone()?, self.steering.clone()?])
+    }
+
+    /// Where the boards are.
+    pub fn ports(&self) -> Ports {
+        let found = || Ports::Found(self.devices.clone());
+        self.named().map_or_else(found, Ports::Named)
+    }
+
+    /// The ports, for what stands for the boards at them.
+    pub fn links(&self) -> Result<[PathBuf; 2]> {
+        self.named()
+            .context("[serial] has to name the ports at which the boards are simulated")
+    }
+
     /// Whether the sensor board is to send its raw readings.
     pub fn tells_raw_line(&self) -> bool {
         self.raw_line.unwrap_or(self.baud == BAUD_RATES[0])
@@ -251,6 +274,11 @@ impl Config {
         }
         if self.simulator.built.is_some() && self.body == Body::Chip {
             bail!("[simulator] built is of a simulated robot, and body is \"chip\"; leave one out");
+        }
+        if self.serial.sensor.is_some() != self.serial.steering.is_some() {
+            bail!(
+                "[serial] names the port of one board only; name both, or none, and the robot finds them"
+            );
         }
         if self.simulator.obstacles as usize > MOST_OBSTACLES {
             bail!(
@@ -508,6 +536,9 @@ mod tests {
             let error = config.validate().expect_err("impossible").to_string();
             assert!(error.contains(word), "{error}");
         }
+        let named: Config = toml::from_str("[serial]\nsensor = \"/dev/a\"").expect("valid");
+        let refused = named.validate().expect_err("one port").to_string();
+        assert!(refused.contains("name both, or none"), "{refused}");
         let rates = BAUD_RATES.map(|baud| format!("[serial]\nbaud = {baud}"));
         let rangers = [0, 11].map(|reach| format!("[logic]\nranger_cm = {reach}"));
         for text in rates.iter().chain(&rangers) {

@@ -9,12 +9,13 @@ pub mod soon;
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use lager_bridge::serial::{find, holders};
 use lager_home::Clock;
 use lager_ports::NodeState;
 use lager_supervisor::console;
@@ -22,7 +23,7 @@ use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
 use crate::overload::{self, Load};
-use crate::{diagnose, exit, ports};
+use crate::{diagnose, exit};
 
 /// Shared memory that a robot needs, in MiB: 1 when it runs alone, more with every observer.
 const SHARED_MEMORY_MIB: u64 = 16;
@@ -294,7 +295,10 @@ fn serial(config: &Config) -> Finding {
     if config.body != Body::Serial {
         return Good("not needed by a simulated or emulated robot".into());
     }
-    for port in [&config.serial.sensor, &config.serial.steering] {
+    let Some(ports) = config.serial.named() else {
+        return to_be_found(config);
+    };
+    for port in &ports {
         let name = port.display();
         let Ok(metadata) = fs::metadata(port) else {
             return Bad(format!(
@@ -312,17 +316,41 @@ fn serial(config: &Config) -> Finding {
             ));
         }
     }
-    let ports = [&config.serial.sensor, &config.serial.steering];
-    match ports::others(&ports, &own(config)).as_slice() {
+    let [sensor, steering] = &ports;
+    match holders::others(&[sensor, steering], &own(config)).as_slice() {
         [] => Good(format!(
             "{} and {} can be used",
-            config.serial.sensor.display(),
-            config.serial.steering.display()
+            sensor.display(),
+            steering.display()
         )),
         others => {
-            let said: Vec<String> = others.iter().map(ports::Other::said).collect();
+            let said: Vec<String> = others.iter().map(holders::Other::said).collect();
             Bad(said.join("; "))
         }
+    }
+}
+
+/// The serial devices among which the robot finds its boards. Which board is where is another check's.
+fn to_be_found(config: &Config) -> Finding {
+    let devices = find::devices(&config.serial.devices);
+    if devices.is_empty() {
+        let folder = config.serial.devices.clone();
+        return Bad(find::NotFound::NoDevice { folder }.to_string());
+    }
+    let names: Vec<String> = devices
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    let ports: Vec<&PathBuf> = devices.iter().collect();
+    let others = holders::others(&ports, &own(config));
+    let said: Vec<String> = others.iter().map(holders::Other::said).collect();
+    let names = names.join(", ");
+    match said.is_empty() {
+        true => Good(format!("the boards are looked for at {names}")),
+        false => Hint(format!(
+            "the boards are looked for at {names}; {}",
+            said.join("; ")
+        )),
     }
 }
 

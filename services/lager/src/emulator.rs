@@ -87,6 +87,7 @@ struct Emulator {
 impl Emulator {
     fn start(config: &Config, warehouse: &Warehouse, kept: Option<&Truth>) -> Result<Self> {
         let parts = config.chip.parts(config.serial.baud)?;
+        let [sensor_link, steering_link] = config.serial.links()?;
         let mut command = Command::new(&parts.emulator);
         command
             .arg("--sensor-elf")
@@ -94,9 +95,9 @@ impl Emulator {
             .arg("--steering-elf")
             .arg(&parts.steering_elf)
             .arg("--sensor-link")
-            .arg(&config.serial.sensor)
+            .arg(sensor_link)
             .arg("--steering-link")
-            .arg(&config.serial.steering)
+            .arg(steering_link)
             .args(["--warehouse", &serde_json::to_string(warehouse)?])
             .args(["--seed", &config.simulator.seed.to_string()])
             .args(["--obstacles", &config.simulator.obstacles.to_string()])

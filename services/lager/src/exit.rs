@@ -37,6 +37,21 @@ pub struct InUse {
     pub pid: String,
 }
 
+/// Somebody writes in the place of a robot, as `lager bag play` and `lager topic pub` do.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "process {pid} ({command}) writes in the place of the robot `{name}`, so nobody starts that and \
+     nobody works on its boards; end it, and do this again"
+)]
+pub struct InItsPlace {
+    /// The robot's name.
+    pub name: String,
+    /// Whoever writes.
+    pub pid: u32,
+    /// Its command.
+    pub command: String,
+}
+
 /// Whether another attempt may succeed: other processes were just making or removing a file that
 /// this one needed. On a busy machine that may take longer than this one waits.
 fn may_try_again(error: &anyhow::Error) -> bool {
@@ -73,6 +88,7 @@ pub fn code(error: &anyhow::Error) -> ExitCode {
     if error.is::<Usage>() {
         ExitCode::from(2)
     } else if error.is::<InUse>()
+        || error.is::<InItsPlace>()
         || matches!(
             error.downcast_ref(),
             Some(LockError::Up { .. } | LockError::Service { .. })
@@ -94,6 +110,7 @@ pub fn may_have_a_cause(error: &anyhow::Error) -> bool {
         && !error.is::<Interrupted>()
         && !error.is::<LockError>()
         && !error.is::<InUse>()
+        && !error.is::<InItsPlace>()
 }
 
 /// The mission ended, but not every product was delivered.

@@ -24,7 +24,6 @@ mod goods;
 mod hint;
 mod meant;
 mod overload;
-mod ports;
 mod reach;
 mod realtime;
 mod report;
@@ -160,7 +159,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         Command::Bridge(args) => {
             service(&config, Role::Bridge, &args, &shutdown, |bus, resume, _| {
                 let bridge = BridgeConfig {
-                    ports: [config.serial.sensor.clone(), config.serial.steering.clone()],
+                    ports: config.serial.ports(),
                     baud: config.serial.baud,
                     raw_line: config.serial.tells_raw_line(),
                     original_boards: config.serial.original_boards,
@@ -190,14 +189,15 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                 &args,
                 &shutdown,
                 |bus, resume, _| {
+                    let [sensor_link, steering_link] = config.serial.links()?;
                     let simulator = SimulatorConfig {
                         warehouse: config.simulated_warehouse()?,
                         seed: config.simulator.seed,
                         build: config.simulator.build(),
                         obstacles: config.simulator.obstacles,
                         baud: config.serial.baud,
-                        sensor_link: config.serial.sensor.clone(),
-                        steering_link: config.serial.steering.clone(),
+                        sensor_link,
+                        steering_link,
                         resume,
                     };
                     Ok(lager_simulator::run(bus, &simulator, &shutdown)?)

@@ -52,8 +52,8 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let folder = RuntimeFolder::create(&config.bus()?)?;
     let mut lock = folder.lock()?;
     if config.body != Body::Serial {
-        config.serial.sensor = folder.sensor_port();
-        config.serial.steering = folder.steering_port();
+        config.serial.sensor = Some(folder.sensor_port());
+        config.serial.steering = Some(folder.steering_port());
     }
     match config.body {
         Body::Sim => config.chip.clock = None,
@@ -411,11 +411,11 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
         }
         config.body = Body::Serial;
     }
-    if let Some(port) = &args.sensor {
-        config.serial.sensor.clone_from(port);
+    if args.sensor.is_some() {
+        config.serial.sensor.clone_from(&args.sensor);
     }
-    if let Some(port) = &args.steering {
-        config.serial.steering.clone_from(port);
+    if args.steering.is_some() {
+        config.serial.steering.clone_from(&args.steering);
     }
     if let Some(baud) = args.baud {
         config.serial.baud = baud;

@@ -5,8 +5,10 @@
 //! nothing of packets.
 //!
 //! A pseudo terminal works like a real port: modem lines are ignored, and the driver's low-latency
-//! mode helps but is not necessary.
+//! mode helps but is not necessary. It needs no speed, so one that cannot be set hinders nothing.
 
+pub mod find;
+pub mod holders;
 mod low_latency;
 
 use std::fmt;
@@ -19,8 +21,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{FlockOperation, Mode, OFlags, fcntl_setfl, flock, fstat, major, open};
 use rustix::io::Errno;
 use rustix::termios::{
-    ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, ioctl_tiocexcl,
-    tcflush, tcgetattr, tcsetattr,
+    ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, Termios,
+    ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
 };
 
 /// Why a port cannot be opened, and what to do.
@@ -109,9 +111,12 @@ pub enum Sent {
 /// It is opened twice. A read may sleep, so that waiting and reading are one system call. A write
 /// must not sleep.
 pub struct SerialPort {
+    path: PathBuf,
     reading: OwnedFd,
     writing: OwnedFd,
     low_latency: bool,
+    /// What was set before.
+    former: Termios,
 }
 
 /// How long the driver lets a read sleep, in tenths of a second.
@@ -121,6 +126,7 @@ const READ: Duration = Duration::from_millis(100 * READ_TENTHS as u64);
 impl fmt::Debug for SerialPort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("SerialPort")
+            .field("path", &self.path)
             .field("low_latency", &self.low_latency)
             .finish_non_exhaustive()
     }
@@ -138,6 +144,7 @@ impl SerialPort {
         let writing = open(path, flags, Mode::empty()).map_err(fail)?;
         let mut termios = tcgetattr(&writing).map_err(fail)?;
         lock(&writing).map_err(fail)?;
+        let former = termios.clone();
 
         termios.make_raw();
         termios.input_modes &= !(InputModes::IXOFF | InputModes::IXANY | InputModes::INPCK);
@@ -161,7 +168,7 @@ impl SerialPort {
         tcsetattr(&writing, OptionalActions::Now, &termios).map_err(fail)?;
         // The driver says which speed it has really set.
         let set = tcgetattr(&writing).map_err(fail)?.output_speed();
-        if set.abs_diff(baud) > baud / 50 {
+        if !will_do(set, baud, is_pty(&writing).map_err(fail)?) {
             return Err(no_such_speed(Errno::INVAL));
         }
         let low_latency = low_latency::request(&writing);
@@ -172,10 +179,23 @@ impl SerialPort {
         shut_out_others(&writing).map_err(fail)?;
         tcflush(&writing, QueueSelector::IOFlush).map_err(fail)?;
         Ok(Self {
+            path: path.to_owned(),
             reading,
             writing,
             low_latency,
+            former,
         })
+    }
+
+    /// The path by which it was opened.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Closes a port that is no board's, and sets it as it was.
+    pub fn put_back(self) {
+        // A device that has gone needs nothing.
+        let _ = tcsetattr(&self.writing, OptionalActions::Now, &self.former);
     }
 
     /// Whether the driver passes on bytes at once. (Some USB adapters collect them for 16 ms.)
@@ -239,11 +259,21 @@ fn lock(fd: &OwnedFd) -> Result<(), Errno> {
 /// Keeps out programs that ask for no lock (TIOCEXCL). Not on a pseudo terminal: there it would
 /// outlive a killed process while the other end is open, and shut out the next bridge.
 fn shut_out_others(fd: &OwnedFd) -> Result<(), Errno> {
-    let is_pty = PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev));
-    if !is_pty {
+    if !is_pty(fd)? {
         ioctl_tiocexcl(fd)?;
     }
     Ok(())
+}
+
+/// Whether a port does for `baud` whose driver has set the speed `set`. An adapter has to come near; a
+/// pseudo terminal carries bytes at any speed, and an emulator of programs cannot set one.
+const fn will_do(set: u32, baud: u32, is_pty: bool) -> bool {
+    is_pty || set.abs_diff(baud) <= baud / 50
+}
+
+/// Whether it is the slave end of a pseudo terminal.
+fn is_pty(fd: &OwnedFd) -> Result<bool, Errno> {
+    Ok(PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev)))
 }
 
 impl OpenPortError {
@@ -305,6 +335,19 @@ fn put(port: &SerialPort, bytes: &[u8]) -> Result<usize, PortGone> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_a_real_port_needs_the_speed_that_is_asked_for() {
+        for (set, is_real_enough) in [
+            (500_000, true),
+            (495_000, true),
+            (461_538, false),
+            (0, false),
+        ] {
+            assert_eq!(will_do(set, 500_000, false), is_real_enough, "{set}");
+            assert!(will_do(set, 500_000, true));
+        }
+    }
 
     #[test]
     fn every_refusal_of_the_system_says_what_to_do() {

@@ -20,8 +20,8 @@
 mod doing;
 mod saying;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use heapless::spsc::{Consumer, Queue};
@@ -48,6 +48,7 @@ use crate::loan::{Loan, Looking};
 use crate::machine::{BridgeCore, CoreOptions, ResetPress};
 use crate::reader::{Handed, QUEUE, Reader};
 use crate::serial::{PacketWriter, SerialPort};
+use crate::source::Source;
 
 /// Longest wait for anything, in real time: a wake may be missed, and the shutdown flag is checked
 /// that often.
@@ -135,9 +136,10 @@ pub fn run_with(
     }
     // Do this before any thread can bring a board, so that nothing is written that a stop forbids.
     service.act();
+    let turn = Mutex::new(());
     std::thread::scope(|scope| {
         for (place, events) in [first_in, second_in].into_iter().enumerate() {
-            let port = (config.ports[place].as_path(), config.baud);
+            let port = (Source::new(&config.ports, place, &turn), config.baud);
             let (ringer, counts) = (ringer.clone(), (&counts, &end, &loan));
             std::thread::Builder::new()
                 .name(["sensor-port", "steering-port"][place].to_owned())

@@ -11,7 +11,10 @@ use crate::machine::Notice;
 
 impl Service<'_> {
     pub(super) fn say(&mut self, news: &Notice) {
-        let port = |place: usize| self.config.ports[place].display();
+        let port = |place: usize| {
+            let device = self.ports[place].device.as_ref();
+            device.map_or_else(String::new, |port| port.path().display().to_string())
+        };
         match *news {
             Notice::Up { place, board } => {
                 let BoardUp { up, link_epoch } = board;

@@ -18,8 +18,7 @@ impl Robot {
     /// Both ports, as somebody else opens them.
     fn open_both(&self) -> Option<[SerialPort; 2]> {
         let open = |path| SerialPort::open(path, self.bridge_config.baud).ok();
-        let [sensor, steering] = &self.bridge_config.ports;
-        Some([open(sensor)?, open(steering)?])
+        Some([open(self.sensor.path())?, open(self.steering.path())?])
     }
 }
 

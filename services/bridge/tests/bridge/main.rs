@@ -2,6 +2,7 @@
 //! scripted boards and an isolated bus.
 
 mod failures;
+mod found;
 mod harness;
 mod lent;
 mod original;

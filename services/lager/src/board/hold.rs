@@ -10,14 +10,15 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use lager_bridge::loan::BORROWER;
 use lager_bridge::serial::OpenPortError;
-use lager_home::{Lock, LockError};
+use lager_home::{Home, Lock, LockError, UnitName};
+use lager_sample::Part;
 use lager_supervisor::console;
 use lager_topics::{Role, StopCause};
 use lager_wake::Shutdown;
 
-use super::{BoardLine, open};
+use super::{BoardLine, find, open};
 use crate::config::Config;
-use crate::exit::InUse;
+use crate::exit::{InItsPlace, InUse};
 use crate::stop;
 
 /// How long a bridge may take to let go of its ports, in real time.
@@ -86,6 +87,28 @@ impl Hold {
         }
     }
 
+    /// Finds the ports of both boards, as soon as the bridge has let go of them.
+    ///
+    /// # Errors
+    /// A board was not found.
+    pub fn find(
+        &self,
+        config: &Config,
+        baud: Option<u32>,
+        shutdown: &Shutdown,
+    ) -> Result<Vec<PathBuf>> {
+        let start = Instant::now();
+        loop {
+            let [sensor, steering] = find(config, baud, shutdown)?;
+            let found = sensor.and_then(|sensor| Ok(vec![sensor, steering?]));
+            let waits = self.taken.is_none() && found.is_err() && start.elapsed() < LETS_GO;
+            if !waits || shutdown.is_requested() {
+                return found.context("name the ports of the boards with --port");
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
     /// What people have to know when the work is done and the robot is up.
     pub fn end(self) -> Result<()> {
         match self.taken {
@@ -140,7 +163,7 @@ impl Drop for Taken {
 /// Takes the robot's name. No robot of this name starts while the guard lives.
 ///
 /// # Errors
-/// The robot is up, or somebody else has taken its name.
+/// The robot is up, somebody writes in its place, or somebody else has taken its name.
 pub fn take_robot(config: &Config) -> Result<Taken> {
     let bus = config.bus()?;
     let home = bus.home()?;
@@ -149,7 +172,28 @@ pub fn take_robot(config: &Config) -> Result<Taken> {
             lock: Some(lock),
             folder: home.folder_of(&bus.unit),
         }),
-        Err(LockError::Up { unit, pid }) => Err(InUse { name: unit, pid }.into()),
+        Err(LockError::Up { unit, pid }) => Err(match in_its_place(&home, &bus.unit) {
+            Some(writer) => writer.into(),
+            None => InUse { name: unit, pid }.into(),
+        }),
         Err(error) => Err(error.into()),
     }
+}
+
+/// The process that writes in the place of a robot. It holds the locks of name and bridge alone; of a
+/// robot that is up they belong to two processes.
+fn in_its_place(home: &Home, unit: &UnitName) -> Option<InItsPlace> {
+    let holders = home.up().remove(unit)?;
+    let pid = |what: &str| holders.iter().find(|it| it.what == what).map(|it| it.pid);
+    let bridge = Part::from(Role::Bridge).name();
+    let writer = pid("up").filter(|own| pid(bridge) == Some(*own))?;
+    let command = std::fs::read(format!("/proc/{writer}/cmdline")).ok()?;
+    let words = command
+        .split(|byte| *byte == 0)
+        .map(String::from_utf8_lossy);
+    Some(InItsPlace {
+        name: unit.to_string(),
+        pid: writer,
+        command: words.collect::<Vec<_>>().join(" ").trim_end().to_owned(),
+    })
 }

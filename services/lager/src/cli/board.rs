@@ -11,7 +11,7 @@ use crate::config::flag;
 /// `lager board`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  lager board update                                       both boards, at the ports of [serial]
+  lager board update                                       both boards, wherever they are plugged in
   lager board update --port /dev/ttyUSB0 --port /dev/ttyUSB1
   lager board update --image new/sensor.hex                the sensor board only
   lager board reset steering

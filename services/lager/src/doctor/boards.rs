@@ -6,10 +6,11 @@
 //! readings, and tells the steering board how the arm is described, because it then asks those servos.
 //! A board forgets both at its next start.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use lager_bridge::serial::OpenPortError;
+use lager_bridge::serial::find::NotFound;
 use lager_loader::{Found, Runs, UpdateError};
 use lager_topics::Misfit;
 use lager_wake::Shutdown;
@@ -58,11 +59,14 @@ pub fn findings(config: &Config) -> Vec<Check> {
         }
         Err(error) => return vec![("boards", Hint(format!("cannot be asked: {error:#}")))],
     };
-    let ports = [&config.serial.sensor, &config.serial.steering];
     let mut seen = Vec::new();
     let mut checks = Vec::new();
-    // Another check says what is wrong with a port that does not exist.
-    for port in ports.into_iter().filter(|port| port.exists()) {
+    let ports = match config.serial.named() {
+        // Another check says what is wrong with a port that does not exist.
+        Some(ports) => ports.into_iter().filter(|port| port.exists()).collect(),
+        None => found(config, &mut checks),
+    };
+    for port in &ports {
         match ask(config, port) {
             Ok((found, _)) if seen.contains(&found.role) => checks.push((
                 check(found.role),
@@ -86,6 +90,30 @@ pub fn findings(config: &Config) -> Vec<Check> {
         }
     }
     checks
+}
+
+/// The ports of the boards, where the configuration names none. Says why a board was not found.
+fn found(config: &Config, checks: &mut Vec<Check>) -> Vec<PathBuf> {
+    let found = match board::find(config, None, &Shutdown::new()) {
+        Ok(found) => found,
+        Err(error) => {
+            checks.push(("boards", Bad(format!("{error:#}"))));
+            return Vec::new();
+        }
+    };
+    let [first, second] = &found;
+    if first.is_err() && first == second {
+        // Another check says that there is no device.
+        return Vec::new();
+    }
+    let roles = [Callsign::Sensor, Callsign::Steering];
+    let found = roles.into_iter().zip(found);
+    let port = |(role, found): (_, Result<PathBuf, NotFound>)| {
+        found
+            .map_err(|error| checks.push((check(role), Bad(error.to_string()))))
+            .ok()
+    };
+    found.filter_map(port).collect()
 }
 
 /// The subject of a board's finding.

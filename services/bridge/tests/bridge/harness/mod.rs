@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lager_bridge::BridgeError;
-use lager_bridge::{BridgeConfig, buttons};
+use lager_bridge::{BridgeConfig, Ports, buttons};
 use lager_home::Clock;
 use lager_orders::Mode;
 use lager_ports::{Bus, BusConfig, Cause, Client, Publisher, Subscriber};
@@ -370,7 +370,7 @@ impl<A: Peer, B: Peer> Robot<A, B> {
         let sensor = Plugged::new(sensor, isolation.folder().join("sensor"), SPEED);
         let steering = Plugged::new(steering, isolation.folder().join("steering"), SPEED);
         let bridge_config = BridgeConfig {
-            ports: [sensor.path().to_owned(), steering.path().to_owned()],
+            ports: Ports::Named([sensor.path().to_owned(), steering.path().to_owned()]),
             ..BridgeConfig::default()
         };
         let hands = Hands::new(&isolation.open(Role::Operator));

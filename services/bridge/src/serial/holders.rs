@@ -4,7 +4,8 @@
 //! Two readers of one port share its bytes, and each loses those that the other gets. The kernel
 //! says who has the port open (`/proc/PID/fd`), but only of this user's processes; root sees all.
 //! Of other users' processes only names are known. So the check reports programs that are known to
-//! open serial ports, and programs that name the port on their command line.
+//! open serial ports, programs that name the port on their command line, and those that say so in a
+//! lock file, as terminal programs do.
 //!
 //! `ModemManager` opens each new port for a moment, so whether it has one open now says nothing. It
 //! leaves a port alone whose udev property says so, which the Debian package's rules set.
@@ -13,6 +14,9 @@ use std::fs::{self, Metadata};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
+use rustix::io::Errno;
+use rustix::process::{Pid, test_kill_process};
+
 /// Programs that open serial ports by themselves.
 const MEDDLERS: [&str; 2] = [MODEM_MANAGER, "brltty"];
 
@@ -20,6 +24,8 @@ const MODEM_MANAGER: &str = "ModemManager";
 /// The property of a port that it leaves alone, as udev keeps it in this folder.
 const LEFT_ALONE: &str = "E:ID_MM_DEVICE_IGNORE=1";
 const UDEV: &str = "/run/udev/data";
+/// Where terminal programs leave files such as `LCK..ttyUSB0` with their process number.
+const LOCKS: &str = "/run/lock";
 
 /// A process that is not the robot's and has a port open, or may.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -91,7 +97,34 @@ pub fn others(ports: &[&PathBuf], own: &[u32]) -> Vec<Other> {
             }
         }
     }
+    for port in ports {
+        if let Some(pid) = locked_by(Path::new(LOCKS), port)
+            && !own.contains(&pid)
+            && pid != std::process::id()
+            && found.iter().all(|other| other.pid != pid)
+        {
+            let name = fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
+            found.push(Other {
+                pid,
+                name: name.trim().to_owned(),
+                port: (*port).clone(),
+                is_sure: true,
+            });
+        }
+    }
     found
+}
+
+/// The running process that says by a lock file that it has the port.
+fn locked_by(locks: &Path, port: &Path) -> Option<u32> {
+    let port = fs::canonicalize(port).ok()?;
+    let file = format!("LCK..{}", port.file_name()?.to_str()?);
+    let text = fs::read_to_string(locks.join(file)).ok()?;
+    let pid: u32 = text.split_whitespace().next()?.parse().ok()?;
+    let process = Pid::from_raw(pid.try_into().ok()?)?;
+    // A program that was killed leaves its file.
+    let is_there = matches!(test_kill_process(process), Ok(()) | Err(Errno::PERM));
+    is_there.then_some(pid)
 }
 
 /// Whether a process has a port open; `None` if the process is another user's.
@@ -148,6 +181,27 @@ mod tests {
         // This process is the doctor itself.
         let others = others(&[&port], &[]);
         assert!(others.iter().all(|other| other.pid != std::process::id()));
+    }
+
+    #[test]
+    fn a_lock_file_counts_while_its_process_runs() {
+        let locks = std::env::temp_dir().join(format!("lager-locks-{}", std::process::id()));
+        fs::create_dir_all(&locks).expect("a temporary folder");
+        let port = Path::new("/dev/null");
+        assert_eq!(locked_by(&locks, port), None);
+        let own = std::process::id();
+        for (text, pid) in [
+            (format!("{own:10}\n"), Some(own)),
+            (format!("{own} minicom root"), Some(own)),
+            // No process has such a number.
+            (format!("{}\n", i32::MAX), None),
+            ("-1\n".into(), None),
+            ("minicom\n".into(), None),
+        ] {
+            fs::write(locks.join("LCK..null"), &text).expect("a file");
+            assert_eq!(locked_by(&locks, port), pid, "{text}");
+        }
+        fs::remove_dir_all(&locks).expect("its own folder");
     }
 
     #[test]
