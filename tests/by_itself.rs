@@ -180,9 +180,7 @@ fn a_robot_whose_steering_board_is_not_heard_stands_and_goes_on_by_a_new_order_o
     let (body, plugged, config) = boards_at_a_cable(&domain);
     let bridge = domain.start(&["--config", &config, "bridge"]);
     let mut watch = DriveObserver::new(&domain);
-    watch.wait_for_health("both boards", |health| {
-        health.steering.up != 0 && health.sensor.up != 0
-    });
+    watch.wait_for_health("both boards", |health| health.boards_are_ready());
     insist(&domain, &["--config", &config, "mode", "manual"]);
     insist(&domain, &["--config", &config, "resume"]);
     let forward = ["--config", &config, "drive", "forward"];

@@ -49,7 +49,7 @@ impl Scene {
         let seen = wait_for("its boards", || {
             let mut seen = Seen::new(self.domain.observe("r1", 1.0));
             let health = wait_for("its health", || seen.health.latest().expect("readable"));
-            (health.sensor.up != 0 && health.steering.up != 0).then_some(())?;
+            health.boards_are_ready().then_some(())?;
             drop(health);
             Some(seen)
         });

@@ -60,8 +60,7 @@ impl Scene {
         let mut health = health.subscriber::<LinkHealth>().expect("a topic");
         wait_for("both boards to be connected, and the robot stopped", || {
             let health = health.latest().expect("readable")?;
-            let connected = health.sensor.up != 0 && health.steering.up != 0;
-            (connected && health.stopped != 0).then_some(())
+            (health.boards_are_ready() && health.stopped != 0).then_some(())
         });
     }
 
