@@ -15,6 +15,7 @@ mod logic;
 mod realtime;
 mod robot;
 mod section;
+mod serial;
 mod station;
 
 use std::io::Read as _;
@@ -24,8 +25,6 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
 use lager_battery::Pack;
-use lager_bridge::Ports;
-use lager_bridge::serial::find::DEVICES;
 use lager_home::UnitName;
 use lager_lines::check_names;
 use lager_orders::Pick;
@@ -50,6 +49,7 @@ pub use documented::flag;
 pub use gateway::GatewaySection;
 pub use logic::LogicSection;
 pub use realtime::RealtimeSection;
+pub use serial::{BAUD_RATES, SerialSection};
 pub use station::{CommSection, StationSection};
 
 use section::section;
@@ -59,9 +59,6 @@ use crate::realtime::HIGHEST_PRIORITY;
 
 /// The built-in warehouse of a simulated or emulated robot whose warehouse nobody names.
 pub const SIMULATED_WAREHOUSE: &str = "small";
-
-/// The baud rates of the boards: today's, and the original's (UBRR 103).
-pub const BAUD_RATES: [u32; 2] = [500_000, 9_600];
 
 /// The allowed speeds of a robot's clock; 1 is real time.
 pub const SPEEDS: RangeInclusive<f64> = 0.01..=20.0;
@@ -148,40 +145,15 @@ section! {
 }
 
 section! {
-    "serial"
-    /// The cables to the boards. Without names of ports, the robot listens to each serial device
-    /// (ttyUSB*, ttyACM*) that nobody uses, until both boards have said who they are. It writes to
-    /// none that has not spoken as a board.
-    pub struct SerialSection {
-        /// The ports of the boards, both or none; it does not matter which board is at which port.
-        pub sensor: Option<PathBuf> = None,
-        pub steering: Option<PathBuf> = None,
-        /// The folder with the serial devices, or with links to those of this robot.
-        pub devices: PathBuf = DEVICES.into(),
-        /// Baud rate of both: 500000, or 9600 for boards of the original build.
-        pub baud: u32 = BAUD_RATES[0],
-        /// Whether the sensor board also sends which of its eleven sensors see tape, for the view
-        /// *Line* and for programs. Unset, it does at 500000 Bd, where these bits make a frame
-        /// 0.2 ms later, and not at 9600 Bd, where they would take 11 ms.
-        pub raw_line: Option<bool> = None,
-        /// Whether to drive an original steering board. Its commands have no age limit. Boards of
-        /// this project stop the wheels within 200 ms whatever dies; an original board goes on with
-        /// its last command until the bridge, or its power switch, makes it stand. If false, the
-        /// bridge only makes such a board stand.
-        pub original_boards: bool = false,
-    }
-}
-
-section! {
     "simulator"
     /// The simulated robot and the emulated boards' world.
     pub struct SimulatorSection {
         /// Seed of all noise: the same seed gives the same robot.
         pub seed: u64 = 1,
         /// Seed of how the simulated robot is built: which motors are swapped or reversed, how fast it
-        /// is, which way round its line sensors read, which ranger it has, and whether its battery is
-        /// measured. Unset, it is built as the defaults of [wheels], [line], [distance] and [battery]
-        /// say. Another robot drives well only when somebody has described it (`lager commission`).
+        /// is, which way round its line sensors read, which ranger it has, whether its battery is
+        /// measured, and which servos its arm has. Unset, it is built as the defaults of [wheels],
+        /// [line], [distance], [battery] and [arm] say. Another robot drives well only when somebody has described it (`lager commission`).
         pub built: Option<u64> = None,
         /// How many things come and go on the ways of the simulated floor, at random: 0 to 64. They
         /// need squares of 50 cm or more.
@@ -193,30 +165,6 @@ impl SimulatorSection {
     /// How the simulated robot is built.
     pub fn build(&self) -> Build {
         self.built.map_or_else(Build::default, Build::drawn)
-    }
-}
-
-impl SerialSection {
-    /// The ports that the configuration names; `None` if the boards have to be found.
-    pub fn named(&self) -> Option<[PathBuf; 2]> {
-        Some([self.sensor.clone()?, self.steering.clone()?])
-    }
-
-    /// Where the boards are.
-    pub fn ports(&self) -> Ports {
-        let found = || Ports::Found(self.devices.clone());
-        self.named().map_or_else(found, Ports::Named)
-    }
-
-    /// The ports, for what stands for the boards at them.
-    pub fn links(&self) -> Result<[PathBuf; 2]> {
-        self.named()
-            .context("[serial] has to name the ports at which the boards are simulated")
-    }
-
-    /// Whether the sensor board is to send its raw readings.
-    pub fn tells_raw_line(&self) -> bool {
-        self.raw_line.unwrap_or(self.baud == BAUD_RATES[0])
     }
 }
 
@@ -265,20 +213,9 @@ impl Config {
                 self.speed
             );
         }
-        if !BAUD_RATES.contains(&self.serial.baud) {
-            let [usual, slow] = BAUD_RATES;
-            bail!(
-                "[serial] baud is {}; boards are built for {usual}, or for {slow} as the original ones",
-                self.serial.baud
-            );
-        }
+        self.serial.validate()?;
         if self.simulator.built.is_some() && self.body == Body::Chip {
             bail!("[simulator] built is of a simulated robot, and body is \"chip\"; leave one out");
-        }
-        if self.serial.sensor.is_some() != self.serial.steering.is_some() {
-            bail!(
-                "[serial] names the port of one board only; name both, or none, and the robot finds them"
-            );
         }
         if self.simulator.obstacles as usize > MOST_OBSTACLES {
             bail!(
