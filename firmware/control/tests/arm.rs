@@ -3,9 +3,9 @@
 mod support;
 
 use lager_control::SteeringConfig;
-use lager_wire::SteerFlags;
+use lager_wire::{ArmProfile, SteerFlags};
 use support::Bench;
-use support::arm::{arm_data, done, refused};
+use support::arm::{arm_data, done, refused, with_arm};
 use support::servos::Servos;
 
 const CLOCKWISE: u8 = 0xF1;
@@ -74,9 +74,9 @@ fn every_step_moves_its_joint_three_units_its_way() {
 
 #[test]
 fn steps_end_at_the_limits_and_are_refused_there() {
-    let mut config = SteeringConfig::default();
-    config.arm.profile.limits.base.highest = 514;
-    let mut bench = Bench::ready_with(config, Servos::at([512; 8]));
+    let mut profile = ArmProfile::default();
+    profile.limits.base.highest = 514;
+    let mut bench = Bench::ready_with(with_arm(profile), Servos::at([512; 8]));
     done(&mut bench, LEFT, 100);
     assert_eq!(bench.pins.servos.positions()[0], 514, "two of the three");
     for count in 1..=3 {
@@ -94,9 +94,9 @@ fn steps_end_at_the_limits_and_are_refused_there() {
 
 #[test]
 fn an_arm_outside_its_limits_is_only_stepped_back() {
-    let mut config = SteeringConfig::default();
-    config.arm.profile.limits.base.highest = 600;
-    let mut bench = Bench::ready_with(config, Servos::at([700; 8]));
+    let mut profile = ArmProfile::default();
+    profile.limits.base.highest = 600;
+    let mut bench = Bench::ready_with(with_arm(profile), Servos::at([700; 8]));
     refused(&mut bench, LEFT);
     done(&mut bench, RIGHT, 100);
     assert_eq!(bench.pins.servos.positions()[0], 697, "a step, no leap");
@@ -188,12 +188,14 @@ fn a_squeeze_on_nothing_ends_closed() {
 
 #[test]
 fn a_gripper_that_closes_the_other_way_is_a_matter_of_numbers() {
-    let mut config = SteeringConfig::default();
-    config.arm.profile.gripper_open = 500;
-    config.arm.profile.gripper_closed = 560;
+    let profile = ArmProfile {
+        gripper_open: 500,
+        gripper_closed: 560,
+        ..ArmProfile::default()
+    };
     let mut servos = Servos::at([512; 8]);
     servos.id(8).position = 500.0;
-    let mut bench = Bench::ready_with(config, servos);
+    let mut bench = Bench::ready_with(with_arm(profile), servos);
     done(&mut bench, SQUEEZE, 3_000);
     assert_eq!(bench.pins.servos.id(8).goal, 560);
 }
@@ -204,7 +206,7 @@ fn drop_lowers_opens_and_comes_back_up() {
     servos.id(8).stop = 399.0;
     let mut bench = Bench::ready_with(SteeringConfig::default(), servos);
     done(&mut bench, DROP, 12_000);
-    let config = SteeringConfig::default().arm.profile;
+    let config = ArmProfile::default();
     let shoulder = &bench.pins.servos.id(2).goals;
     assert_eq!(
         shoulder[shoulder.len() - 2..],
@@ -243,7 +245,7 @@ fn drop_opens_only_when_the_arm_is_down() {
         }
     }
     assert_eq!(bench.pins.servos.id(8).goals.last(), Some(&512));
-    let low = SteeringConfig::default().arm.profile.drop.shoulder;
+    let low = ArmProfile::default().drop.shoulder;
     assert!(bench.pins.servos.positions()[1].abs_diff(low) <= 6);
 }
 

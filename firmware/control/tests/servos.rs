@@ -8,7 +8,7 @@ use lager_wire::{
     SettingStatus, SteerFlags,
 };
 use support::Bench;
-use support::arm::{arm_data, done};
+use support::arm::{arm_data, done, with_arm};
 use support::servos::Servos;
 
 const UP: u8 = 0xF5;
@@ -61,12 +61,6 @@ fn tell(bench: &mut Bench, profile: &ArmProfile) -> SettingReply {
     *last
 }
 
-fn config(profile: ArmProfile) -> SteeringConfig {
-    let mut config = SteeringConfig::default();
-    config.arm.profile = profile;
-    config
-}
-
 /// The last report of the servo with this number.
 fn told(bench: &Bench, number: u8) -> Option<ArmData> {
     let reports = arm_data(bench);
@@ -96,7 +90,7 @@ fn ids_and_directions_are_told_and_every_servo_holds_where_it_is() {
 
 #[test]
 fn a_reversed_joint_moves_the_way_it_is_told() {
-    let mut bench = Bench::ready_with(config(other()), wired([512; 8]));
+    let mut bench = Bench::ready_with(with_arm(other()), wired([512; 8]));
     done(&mut bench, LEFT, 200);
     let base = bench.pins.servos.positions()[0];
     assert_eq!(base, 509, "to the left is down on this servo");
@@ -116,7 +110,7 @@ fn a_reversed_joint_moves_the_way_it_is_told() {
 
 #[test]
 fn a_reversed_gripper_feels_what_it_holds() {
-    let mut bench = Bench::ready_with(config(other()), wired([512; 8]));
+    let mut bench = Bench::ready_with(with_arm(other()), wired([512; 8]));
     done(&mut bench, RELEASE, 3_000);
     assert_eq!(bench.pins.servos.id(16).position.round(), 511.0);
     done(&mut bench, SQUEEZE, 8_000);
@@ -136,7 +130,7 @@ fn a_joint_with_one_servo_has_no_second_one() {
     let mut servos = Servos::at([512; 8]);
     servos.id(3).present = false;
     servos.id(5).present = false;
-    let mut bench = Bench::ready_with(config(profile), servos);
+    let mut bench = Bench::ready_with(with_arm(profile), servos);
     bench.run_ms(2_000);
     assert_eq!(bench.report().servo_errors, 0);
     assert_eq!((told(&bench, 3), told(&bench, 5)), (None, None));

@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 use core::time::Duration;
 
 use lager_wire::link::{HostEvent, HostLink, HostTransmitter, Up};
-use lager_wire::{Callsign, PACKET_LENGTH, Payload, ResetCause, ResetOrder, Version};
+use lager_wire::{Callsign, PACKET_LENGTH, Payload, ResetCause, ResetOrder, Setting, Version};
 
 use crate::client::{Client, LoaderError};
 use crate::error::UpdateError;
@@ -141,26 +141,31 @@ fn connect<L: Line>(
     })
 }
 
-/// Keeps the link to the application at `line` for this time, sends it `order` whenever the link
-/// comes up, and hands over everything that it says.
+/// Keeps the link to the application at `line` for this time and hands over everything that it says.
+/// Whenever the link comes up it gets `settings`, each when it has answered the one before.
 ///
 /// # Errors
 /// The line is gone.
 pub fn listen<L: Line>(
     line: &mut L,
     within: Duration,
-    order: Option<Payload>,
+    settings: &[Setting],
     mut heard: impl FnMut(Payload),
 ) -> Result<(), UpdateError> {
     let mut transmitter = HostTransmitter::new();
+    let mut left = [].iter();
     let ended = converse(line, &mut transmitter, within, |transmitter, news| {
-        ControlFlow::<(), _>::Continue(match news {
-            News::Up(_) => order.and_then(|order| transmitter.encode(order)),
+        match news {
+            News::Up(_) => left = settings.iter(),
             News::Packet(payload) => {
                 heard(payload);
-                None
+                if !matches!(payload, Payload::SettingReply(_)) {
+                    return ControlFlow::<(), _>::Continue(None);
+                }
             }
-        })
+        }
+        let next = left.next().copied().map(Payload::Setting);
+        ControlFlow::Continue(next.and_then(|next| transmitter.encode(next)))
     });
     ended.map(|_| ())
 }

@@ -11,9 +11,10 @@
 //! ```
 //! With all servos at 512 the upper arm is straight up, the forearm points level ahead, and the
 //! claw is 80 mm open. The mirrored servo of a pair stands at 1023 minus its partner's position.
-//! The direction in which a servo counts depends on its mounting; the constants below fix it.
+//! The direction in which a servo counts depends on its mounting. Here it counts as the constants
+//! below say; [`crate::ArmBuild`] has the ids of the servos and those that count the other way.
 
-/// Number of servos (AMB-32). `lager_wire` says it too: a world knows of no packets.
+/// Number of servos, of which two may be absent (AMB-32). `lager_wire` says it too: a world knows of no packets.
 pub const SERVOS: usize = 8;
 /// The servos' positions before a robot starts: the pose for driving, the claw open. An unpowered
 /// arm stays where somebody put it.

@@ -8,9 +8,13 @@
 //! | line sensors | high over dark tape | low |
 //! | IR ranger | GP2Y0A21 | GP2Y0A41, GP2Y0A02 |
 //! | battery | a quarter of it at the steering board | the input floats |
+//! | servos | ids 1 to 8 | other ids |
+//! | joints | each counts as drawn | any of them counts the other way |
+//! | shoulder, elbow | two servos that face each other | one servo |
 //!
 //! A robot of another build drives only when its boards have been told of it.
 
+use crate::arm::SERVOS;
 use crate::noise::Noise;
 
 /// Time of a full turn of the robot as drawn, in s (W4).
@@ -30,6 +34,24 @@ pub enum Ranger {
     Gp2y0a02,
 }
 
+/// The servos of an arm. The joints and the numbers of their servos are those of [`crate::arm`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArmBuild {
+    /// The id of the servo with each number; `None` where the joint has only one servo.
+    pub ids: [Option<u8>; SERVOS],
+    /// Whether it counts the other way; both servos of a pair do or neither.
+    pub reversed: [bool; SERVOS],
+}
+
+impl Default for ArmBuild {
+    fn default() -> Self {
+        Self {
+            ids: core::array::from_fn(|index| Some(index as u8 + 1)),
+            reversed: [false; SERVOS],
+        }
+    }
+}
+
 /// How a robot is built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
@@ -45,6 +67,8 @@ pub struct Build {
     pub ranger: Ranger,
     /// The steering board can measure the battery.
     pub divider: bool,
+    /// The arm's servos.
+    pub arm: ArmBuild,
 }
 
 impl Default for Build {
@@ -56,6 +80,7 @@ impl Default for Build {
             dark_is_low: false,
             ranger: Ranger::default(),
             divider: true,
+            arm: ArmBuild::default(),
         }
     }
 }
@@ -80,6 +105,7 @@ impl Build {
                 _ => Ranger::Gp2y0a21,
             },
             divider: bit(4),
+            arm: ArmBuild::drawn(&mut noise),
         }
     }
 
@@ -103,6 +129,35 @@ impl Build {
     }
 }
 
+impl ArmBuild {
+    /// The first servo of each joint.
+    const JOINTS: [usize; 6] = [0, 1, 3, 5, 6, 7];
+
+    fn drawn(noise: &mut Noise) -> Self {
+        let bits = noise.bits();
+        let bit = |index: usize| bits >> index & 1 != 0;
+        let mut arm = Self::default();
+        for joint in Self::JOINTS {
+            arm.reversed[joint] = bit(joint);
+        }
+        if bit(8) {
+            // Eight ids in a row in any order: 0 to 253.
+            let lowest = (bits >> 32 & 0xFF) as u8 % 247;
+            arm.ids = core::array::from_fn(|index| Some(lowest + index as u8));
+            for place in (1..SERVOS).rev() {
+                arm.ids.swap(place, noise.bits() as usize % (place + 1));
+            }
+        }
+        for (first, is_single) in [(1, bit(9)), (3, bit(10))] {
+            arm.reversed[first + 1] = arm.reversed[first];
+            if is_single {
+                arm.ids[first + 1] = None;
+            }
+        }
+        arm
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,12 +174,25 @@ mod tests {
             |build| build.ranger != Ranger::Gp2y0a21,
             |build| !build.divider,
             |build| build.gear > 1.0,
+            |build| build.arm.ids[0] != Some(1),
+            |build| build.arm.ids[2].is_none(),
+            |build| build.arm.ids[4].is_none(),
+            |build| build.arm.reversed[0],
+            |build| build.arm.reversed[1],
+            |build| build.arm.reversed[3],
+            |build| build.arm.reversed[5],
+            |build| build.arm.reversed[6],
+            |build| build.arm.reversed[7],
         ] {
             let count = builds.iter().filter(|build| differs(build)).count();
             assert!((30..70).contains(&count), "{count}");
         }
         for build in builds {
             assert!((10.0..=14.0).contains(&build.full_turn()), "{build:?}");
+            let mut ids: Vec<_> = build.arm.ids.into_iter().flatten().collect();
+            ids.sort_unstable();
+            assert!(ids.windows(2).all(|pair| pair[0] < pair[1]), "{build:?}");
+            assert!(ids.len() >= 6 && ids.last() <= Some(&253), "{build:?}");
         }
     }
 

@@ -166,6 +166,7 @@ impl World {
         self.left.set_gear(build.gear);
         self.right.set_gear(build.gear);
         self.ir.set_model(build.ranger);
+        self.servos.fit(&build.arm);
         self
     }
 

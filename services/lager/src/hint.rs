@@ -50,6 +50,7 @@ fn hint(code: &str) -> Option<&'static str> {
         "world_nothing_there" => "`lager obstacle` lists what stands",
         "world_full" => "`lager obstacle take` does",
         "failure_goods_delivered" | "failure_goods_away" => "`lager map back` says so",
+        "failure_servo_silent" => "with the robot down, `lager doctor` names all of them",
         "logic_silent" | "order_untaken" => "is the robot up? (`lager up`)",
         _ => return None,
     })

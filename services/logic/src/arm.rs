@@ -11,6 +11,8 @@ pub(crate) struct ArmSeen {
     /// Which servos have reported in this life of the link.
     heard: [bool; 8],
     claw_load: i16,
+    /// Servos in trouble, one bit each.
+    errors: u8,
     life: Option<u32>,
 }
 
@@ -20,6 +22,7 @@ impl Default for ArmSeen {
             position: [SERVO_UNKNOWN; 8],
             heard: [false; 8],
             claw_load: 0,
+            errors: 0,
             life: None,
         }
     }
@@ -32,6 +35,7 @@ impl ArmSeen {
         if self.life != Some(report.link_epoch) {
             (self.life, self.heard) = (Some(report.link_epoch), [false; 8]);
         }
+        self.errors = report.servo_errors;
         let known = self.position.iter_mut().zip(&mut self.heard);
         for ((known, is_heard), position) in known.zip(report.servo_position) {
             if position != SERVO_UNKNOWN {
@@ -57,6 +61,17 @@ impl ArmSeen {
     /// Whether no servo has reported in this life of the link.
     pub(crate) fn is_unheard(&self) -> bool {
         self.heard == [false; 8]
+    }
+
+    /// The id of the first servo that is in trouble and has not reported in this life of the link,
+    /// and how many there are.
+    pub(crate) fn silent(&self, profile: &ArmProfile) -> Option<(u8, u8)> {
+        let is_silent = |index: &usize| self.errors >> index & 1 != 0 && !self.heard[*index];
+        let mut silent = (0..self.heard.len())
+            .filter(is_silent)
+            .filter_map(|index| profile.servo_id(index));
+        let first = silent.next()?;
+        Some((first, 1 + silent.count() as u8))
     }
 
     /// The life of the link to the steering board in which the last report came.

@@ -23,7 +23,7 @@ use lager_plant::noise::{Noise, START_STREAM};
 use lager_plant::{
     Build, Hand, HandsOff, Make, Pose, Snapshot, Warehouse, WarehouseError, World, WorldState,
 };
-use lager_wire::{ArmProfile, ResetCause};
+use lager_wire::{ArmValues, ResetCause};
 
 use crate::boards::{SensorPins, SteeringPins};
 use crate::exde::ExDe;
@@ -388,8 +388,8 @@ impl Robot {
 }
 
 /// The servos' first positions: the neutral pose, with the claw open.
-fn resting_arm(arm: &ArmProfile) -> [u16; SERVOS] {
-    let pose = arm.neutral;
+fn resting_arm(arm: &ArmValues) -> [u16; SERVOS] {
+    let pose = arm.neutral();
     let facing = |position: u16| MAX_POSITION - position;
     [
         pose.base,
@@ -399,6 +399,6 @@ fn resting_arm(arm: &ArmProfile) -> [u16; SERVOS] {
         facing(pose.elbow),
         pose.wrist,
         REST,
-        arm.gripper_open,
+        arm.gripper_open(),
     ]
 }

@@ -89,6 +89,9 @@ coded! {
         GoodsDelivered = 33,
         /// An order is for product `seen`, known for `expected` s to be out of its place.
         GoodsAway = 34,
+        /// The servo with the id `seen` has not answered since the steering board started, and
+        /// `expected` of the arm's servos have not.
+        ServoSilent = 35,
     }
 }
 
@@ -158,6 +161,7 @@ impl FailureKind {
             | Self::MarkUnseen
             | Self::CornerUnseen
             | Self::BoardRefuses
+            | Self::ServoSilent
             | Self::DrivenByHand
             | Self::OffTheMap
             | Self::StateLost

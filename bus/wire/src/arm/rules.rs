@@ -160,6 +160,14 @@ pub(super) const fn joint_of(servo: usize) -> usize {
     }
 }
 
+impl ArmProfile {
+    /// The name of the joint that the servo with this index moves.
+    #[must_use]
+    pub fn joint_name(servo: usize) -> &'static str {
+        JOINTS[joint_of(servo)]
+    }
+}
+
 /// The first rule that values break.
 pub(super) fn broken(values: &[u16; ArmProfile::VALUES]) -> Option<Rule> {
     let at = |place: u8| values.get(usize::from(place)).copied().unwrap_or(0);
@@ -228,7 +236,7 @@ impl Rule {
         let at = |place: u8| values[usize::from(place)];
         let joint = |limits: u8| JOINTS[usize::from((limits - FIRST_LIMITS) / 2)];
         let limits = |place: u8| limits(values, usize::from(place));
-        let of_servo = |place: u8| JOINTS[joint_of(usize::from(place - SERVOS))];
+        let of_servo = |place: u8| ArmProfile::joint_name(usize::from(place - SERVOS));
         let id = |place: u8| at(place) & !REVERSED;
         match self {
             Self::Strength(place) => ArmProfileError::Strength {

@@ -1,8 +1,16 @@
 //! Gives arm commands and waits for their ends.
 
-use lager_wire::{ArmData, Payload, SteerFlags};
+use lager_control::SteeringConfig;
+use lager_wire::{ArmData, ArmProfile, Payload, SteerFlags};
 
 use super::Bench;
+
+/// A board that starts with this profile of the arm.
+pub fn with_arm(profile: ArmProfile) -> SteeringConfig {
+    let mut config = SteeringConfig::default();
+    config.arm.profile = profile.into();
+    config
+}
 
 /// Gives a command, waits for its end, and returns the flags of the report about it.
 pub fn finish(bench: &mut Bench, code: u8, limit_ms: u32) -> SteerFlags {

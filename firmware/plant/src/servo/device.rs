@@ -23,6 +23,8 @@ const SLOPE: f64 = 32.0;
 pub(super) struct Servo {
     pub(super) table: [u8; LENGTH],
     registered: Option<(u8, Vec<u8>)>,
+    /// It counts the other way: its table has 1023 minus the position.
+    is_reversed: bool,
     pub(super) position: f64,
     /// The lowest position that the joint can reach now, because something is in the way.
     pub(super) stop: f64,
@@ -43,6 +45,7 @@ impl Servo {
         let mut servo = Self {
             table: [0; LENGTH],
             registered: None,
+            is_reversed: false,
             position: f64::from(position),
             stop: 0.0,
             sags: None,
@@ -80,9 +83,25 @@ impl Servo {
         self.table[at..at + 2].copy_from_slice(&value.to_le_bytes());
     }
 
+    /// Mounts it so that it counts the other way, or as drawn.
+    pub(super) fn mount(&mut self, is_reversed: bool) {
+        self.is_reversed = is_reversed;
+        self.set_word(GOAL_POSITION_L, self.counted(self.position.round() as u16));
+        self.publish(0.0, 0.0);
+    }
+
+    /// What stands in the table for a position, and the position for what stands there.
+    fn counted(&self, position: u16) -> u16 {
+        if self.is_reversed {
+            MAX_POSITION.saturating_sub(position)
+        } else {
+            position
+        }
+    }
+
     /// Switches the torque on; the goal is `position`.
     pub(super) fn hold(&mut self, position: u16) {
-        self.set_word(GOAL_POSITION_L, position);
+        self.set_word(GOAL_POSITION_L, self.counted(position));
         self.table[usize::from(TORQUE_ENABLE)] = 1;
         self.publish(0.0, 0.0);
     }
@@ -107,7 +126,7 @@ impl Servo {
             self.rest();
             return;
         }
-        let goal = f64::from(self.word(GOAL_POSITION_L));
+        let goal = f64::from(self.counted(self.word(GOAL_POSITION_L)));
         if goal == self.position && self.position >= self.stop {
             self.rest();
             return;
@@ -141,7 +160,15 @@ impl Servo {
 
     /// Writes the measured values into the table.
     pub(super) fn publish(&mut self, units_per_s: f64, load: f64) {
-        self.set_word(PRESENT_POSITION_L, self.position.round() as u16);
+        let (units_per_s, load) = if self.is_reversed {
+            (-units_per_s, -load)
+        } else {
+            (units_per_s, load)
+        };
+        self.set_word(
+            PRESENT_POSITION_L,
+            self.counted(self.position.round() as u16),
+        );
         self.set_word(PRESENT_SPEED_L, unsigned((units_per_s / SPEED_UNIT) as i16));
         self.set_word(PRESENT_LOAD_L, unsigned(load as i16));
         self.table[usize::from(MOVING)] = u8::from(units_per_s != 0.0);

@@ -23,6 +23,7 @@ use lager_ax12::table::{ID, MAX_POSITION, RETURN_DELAY_TIME};
 use lager_ax12::{BROADCAST_ID, ErrorBits, Frame, Instruction, InstructionDecoder, Packet};
 
 use crate::arm::SERVOS;
+use crate::build::ArmBuild;
 use crate::make::Make;
 use crate::noise::Noise;
 
@@ -48,6 +49,9 @@ pub struct ServoFault {
 #[derive(Clone, Debug)]
 pub struct ServoBus {
     servos: [Servo; SERVOS],
+    /// Whether the arm has it.
+    fitted: [bool; SERVOS],
+    /// Whether it is plugged in.
     present: [bool; SERVOS],
     faults: [ServoFault; SERVOS],
     decoder: InstructionDecoder,
@@ -61,6 +65,7 @@ impl ServoBus {
     pub fn new(positions: [u16; SERVOS]) -> Self {
         Self {
             servos: core::array::from_fn(|index| Servo::new(index as u8 + 1, positions[index])),
+            fitted: [true; SERVOS],
             present: [true; SERVOS],
             faults: [ServoFault::default(); SERVOS],
             decoder: InstructionDecoder::new(),
@@ -83,6 +88,16 @@ impl ServoBus {
         bus
     }
 
+    /// Gives the arm these servos, without torque.
+    pub fn fit(&mut self, arm: &ArmBuild) {
+        for (index, servo) in self.servos.iter_mut().enumerate() {
+            let id = arm.ids[index];
+            (self.fitted[index], self.present[index]) = (id.is_some(), id.is_some());
+            servo.table[usize::from(ID)] = id.unwrap_or(BROADCAST_ID);
+            servo.mount(arm.reversed[index]);
+        }
+    }
+
     /// The board sends `bytes` from `now` on.
     pub fn transmit(&mut self, now: Duration, bytes: &[u8]) {
         let now = nanoseconds(now);
@@ -97,9 +112,8 @@ impl ServoBus {
             let mut packet = self.decoder.push(byte);
             while let Some(found) = packet {
                 let answer = act(&mut self.servos, &self.present, &self.faults, &found);
-                if let Some((delay, frame)) = answer {
+                if let Some((delay, frame, fault)) = answer {
                     let mut at = end + delay;
-                    let fault = faults(&self.faults, found.id);
                     let bytes = frame.as_bytes();
                     for (place, &byte) in bytes.iter().enumerate() {
                         at += BYTE_NS;
@@ -147,31 +161,42 @@ impl ServoBus {
         }
     }
 
-    /// Present positions in units.
+    /// Present positions in units, as the arm as drawn counts. Where a joint has only one servo, the
+    /// second one would stand as if it faced the first.
     pub fn positions(&self) -> [f64; SERVOS] {
-        core::array::from_fn(|index| self.servos[index].position)
+        core::array::from_fn(|index| match self.fitted[index] {
+            true => self.servos[index].position,
+            false => f64::from(MAX_POSITION) - self.servos[index - 1].position,
+        })
     }
 
     /// Moves the servos to these positions, where they hold with torque.
     pub fn set_positions(&mut self, positions: [u16; SERVOS]) {
-        for (servo, position) in self.servos.iter_mut().zip(positions) {
-            servo.position = f64::from(position);
-            servo.hold(position);
+        for (index, servo) in self.servos.iter_mut().enumerate() {
+            if self.fitted[index] {
+                servo.position = f64::from(positions[index]);
+                servo.hold(positions[index]);
+            }
         }
     }
 
-    /// Plugs servo `id` (1 to 8) in or out; an absent one never answers.
+    /// Plugs the servo with this id in or out; an absent one never answers.
     pub fn set_present(&mut self, id: u8, present: bool) {
-        if let Some(place) = self.present.get_mut(usize::from(id).wrapping_sub(1)) {
-            *place = present;
+        if let Some(index) = self.with_id(id) {
+            self.present[index] = present;
         }
     }
 
-    /// Gives servo `id` (1 to 8) this fault; the default mends it.
+    /// Gives the servo with this id a fault; the default mends it.
     pub fn set_fault(&mut self, id: u8, fault: ServoFault) {
-        if let Some(place) = self.faults.get_mut(usize::from(id).wrapping_sub(1)) {
-            *place = fault;
+        if let Some(index) = self.with_id(id) {
+            self.faults[index] = fault;
         }
+    }
+
+    fn with_id(&self, id: u8) -> Option<usize> {
+        (0..SERVOS)
+            .find(|index| self.fitted[*index] && self.servos[*index].table[usize::from(ID)] == id)
     }
 
     /// How often the board sent while a servo was answering.
@@ -180,21 +205,21 @@ impl ServoBus {
     }
 }
 
-/// Lets the servos act on a packet. Returns the return delay in ns and the answer, if one answers.
+/// Lets the servos act on a packet. If one answers, returns its return delay in ns, its answer, and
+/// its fault.
 fn act(
     servos: &mut [Servo; SERVOS],
     present: &[bool; SERVOS],
-    all_faults: &[ServoFault; SERVOS],
+    faults: &[ServoFault; SERVOS],
     packet: &Packet<'_>,
-) -> Option<(u64, Frame)> {
+) -> Option<(u64, Frame, ServoFault)> {
     let instruction = packet.instruction();
-    let reached = servos
-        .iter_mut()
-        .zip(present)
-        .filter(|(_, present)| **present)
-        .map(|(servo, _)| servo);
+    let plugged = servos.iter_mut().zip(present).zip(faults);
+    let mut reached = plugged
+        .filter(|((_, present), _)| **present)
+        .map(|((servo, _), fault)| (servo, *fault));
     if packet.id == BROADCAST_ID {
-        for servo in reached {
+        for (servo, _) in reached {
             match (instruction, packet.parameters) {
                 (Some(Instruction::SyncWrite), [address, width, rest @ ..]) => {
                     let id = servo.table[usize::from(ID)];
@@ -211,19 +236,14 @@ fn act(
         }
         return None;
     }
-    let servo = reached
-        .into_iter()
-        .find(|servo| servo.table[usize::from(ID)] == packet.id)?;
+    let (servo, fault) =
+        reached.find(|(servo, _)| servo.table[usize::from(ID)] == packet.id)?;
     let (errors, registers) = servo.obey(instruction, packet.parameters);
     let delay = u64::from(servo.table[usize::from(RETURN_DELAY_TIME)]) * 2_000;
-    let errors = errors.union(faults(all_faults, packet.id).errors);
+    let errors = errors.union(fault.errors);
     let frame = Frame::status(packet.id, errors, &registers).ok()?;
-    servo.answers(instruction).then_some((delay, frame))
-}
-
-fn faults(faults: &[ServoFault; SERVOS], id: u8) -> ServoFault {
-    let index = usize::from(id).wrapping_sub(1);
-    faults.get(index).copied().unwrap_or_default()
+    let answers = servo.answers(instruction);
+    answers.then_some((delay, frame, fault))
 }
 
 fn nanoseconds(time: Duration) -> u64 {
@@ -423,6 +443,41 @@ mod tests {
         // The elbow sinks to where it rests.
         run(&mut bus, 30_000, 0.0);
         assert_eq!(bus.positions()[3], LYING);
+    }
+
+    #[test]
+    fn another_arm_has_other_ids_and_counts_the_other_way() {
+        let mut bus = ServoBus::sagging([512; SERVOS], Noise::new(1, 1), Make::Varied);
+        let mut arm = ArmBuild::default();
+        arm.ids[0] = Some(253);
+        arm.ids[2] = None;
+        arm.ids[7] = Some(1);
+        (arm.reversed[1], arm.reversed[7]) = (true, true);
+        bus.fit(&arm);
+        for (id, answers) in [(253, true), (1, true), (3, false), (8, false)] {
+            assert_eq!(!ask(&mut bus, &Frame::ping(id)).is_empty(), answers, "{id}");
+        }
+        // The shoulder has one servo. It sinks as far as it would as drawn, and says so its way.
+        run(&mut bus, 30_000, 0.0);
+        let positions = bus.positions();
+        assert_eq!(positions[1..3], [LYING, 1_023.0 - LYING]);
+        let look = |bus: &mut ServoBus, id, address| {
+            let answer = ask(bus, &Frame::read(id, address, 2));
+            u16::from_le_bytes([answer[5], answer[6]])
+        };
+        assert_eq!(look(&mut bus, 2, PRESENT_POSITION_L), 1_023 - 300);
+        // Its goal is meant its way, too.
+        let goal = 423_u16.to_le_bytes();
+        ask(&mut bus, &Frame::write(2, GOAL_POSITION_L, &goal).unwrap());
+        run(&mut bus, 2_000, 0.0);
+        assert_eq!(bus.positions()[1..3], [600.0, 423.0]);
+        // The claw closes on something, and pushes towards closed.
+        let goal = (1_023_u16 - 440).to_le_bytes();
+        ask(&mut bus, &Frame::write(1, GOAL_POSITION_L, &goal).unwrap());
+        run(&mut bus, 300, 462.0);
+        assert_eq!(bus.positions()[7], 462.0);
+        let load = lager_ax12::table::signed(look(&mut bus, 1, PRESENT_LOAD_L));
+        assert!(load > 300, "{load}");
     }
 
     #[test]

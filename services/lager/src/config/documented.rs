@@ -13,7 +13,7 @@ use super::{
 };
 
 /// Every section, in the order of the file.
-const SECTIONS: [Section; 22] = [
+const SECTIONS: [Section; 24] = [
     Config::SECTION,
     LogSection::SECTION,
     BusSection::SECTION,
@@ -41,6 +41,8 @@ const SECTIONS: [Section; 22] = [
         about: ArmProfile::ABOUT,
         keys: ArmProfile::KEYS,
     },
+    joints("arm.servos"),
+    joints("arm.reversed"),
     joints("arm.limits"),
     joints("arm.neutral"),
     joints("arm.drop"),
@@ -170,7 +172,9 @@ mod tests {
     use super::*;
     use lager_bridge::buttons::SwitchKind;
     use lager_comm::LinkLost;
-    use lager_wire::{ArmLimits, IrModel, JointLimits};
+    use lager_wire::{
+        ArmLimits, IrModel, JointLimits, JointServos, OneOrTwo, ReversedJoints,
+    };
 
     #[test]
     fn the_documented_file_reads_back_with_every_key() {
@@ -216,6 +220,15 @@ mod tests {
             },
             arm: ArmProfile {
                 torque_limit: 700,
+                servos: JointServos {
+                    base: 12,
+                    elbow: OneOrTwo::One(4),
+                    ..JointServos::default()
+                },
+                reversed: ReversedJoints {
+                    wrist: true,
+                    ..ReversedJoints::default()
+                },
                 limits: JointLimits {
                     elbow: ArmLimits {
                         lowest: 100,

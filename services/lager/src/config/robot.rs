@@ -97,7 +97,7 @@ impl Config {
 
     /// How this robot differs from the simulated one, in a few words.
     pub fn built(&self) -> String {
-        let usual = WheelsProfile::default();
+        let (usual, usual_arm) = (WheelsProfile::default(), ArmProfile::default());
         let (wheels, ranger) = (&self.wheels, &self.distance);
         let model = match ranger.model {
             IrModel::Own => Some("an IR ranger with a curve of its own".to_owned()),
@@ -119,7 +119,19 @@ impl Config {
             ),
             model,
             when(!self.robot().steering.divider, "no battery divider"),
-            when(self.arm != ArmProfile::default(), "an arm of its own"),
+            when(
+                self.arm.servos != usual_arm.servos,
+                "servos with other ids",
+            ),
+            when(self.arm.reversed != usual_arm.reversed, "reversed joints"),
+            when(
+                ArmProfile {
+                    servos: usual_arm.servos,
+                    reversed: usual_arm.reversed,
+                    ..self.arm
+                } != usual_arm,
+                "an arm of its own",
+            ),
         ];
         let differs: Vec<_> = differs.into_iter().flatten().collect();
         match differs.is_empty() {
@@ -151,6 +163,8 @@ fn take<T: Clone + Default + PartialEq>(
 
 #[cfg(test)]
 mod tests {
+    use lager_wire::{JointServos, OneOrTwo, ReversedJoints};
+
     use super::*;
 
     /// A folder that goes with its owner.
@@ -210,6 +224,15 @@ mod tests {
             },
             arm: ArmProfile {
                 squeeze_load: 250,
+                servos: JointServos {
+                    base: 11,
+                    shoulder: OneOrTwo::One(2),
+                    ..JointServos::default()
+                },
+                reversed: ReversedJoints {
+                    elbow: true,
+                    ..ReversedJoints::default()
+                },
                 ..ArmProfile::default()
             },
             ..Config::default()
@@ -229,7 +252,8 @@ mod tests {
         assert_eq!(
             there.built(),
             "motors swapped, left motor reversed, a full turn in 9000 ms, line sensors that read \
-             low over tape, IR ranger GP2Y0A41, no battery divider, an arm of its own"
+             low over tape, IR ranger GP2Y0A41, no battery divider, servos with other ids, \
+             reversed joints, an arm of its own"
         );
         assert_eq!(Config::default().built(), "as the simulated robot");
     }
@@ -240,6 +264,14 @@ mod tests {
             ("[wheels]\nswaped = true\n", "did you mean `swapped`?"),
             ("[wheels]\nduty = 9\n", "[wheels] duty is 9"),
             ("[line]\ndark_is_high = 1\n", "true or false"),
+            ("[arm.servos]\nbase = 300\n", "line 2, base = 300"),
+            ("[arm.servos]\nbase = 254\n", "[arm.servos] base has id 254"),
+            ("[arm.servos]\nwrist = 8\n", "wrist and gripper have the same id 8"),
+            ("[arm.servos]\nelbow = 300\n", "a whole number from 0 to 255"),
+            ("[arm.servos]\nelbow = [4, 5, 6]\n", "the two of a pair"),
+            ("[arm.servos]\nelbow = []\n", "the id of one servo"),
+            ("[arm.reversed]\nbase = 1\n", "true or false"),
+            ("[arm.reversed]\nclaw = true\n", "unknown field `claw`"),
             ("[distance]\nmodel = \"gp2y0a12\"\n", "gp2y0a21"),
             ("[serial]\nbaud = 9600\n", "unknown field `serial`"),
             ("wheels", "line 1"),

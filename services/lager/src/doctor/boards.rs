@@ -3,7 +3,8 @@
 //!
 //! It opens the ports as the bridge does and takes the robot's name meanwhile, so no robot starts
 //! beside it. It gives no command, so nothing moves. It only asks the sensor board for its raw
-//! readings, and a board forgets that at its next start.
+//! readings, and tells the steering board how the arm is described, because it then asks those servos.
+//! A board forgets both at its next start.
 
 use std::path::Path;
 use std::time::Duration;
@@ -13,8 +14,8 @@ use lager_loader::{Found, Runs, UpdateError};
 use lager_topics::Misfit;
 use lager_wake::Shutdown;
 use lager_wire::{
-    ArmData, BoardStatus, Callsign, Centimetres, LineBits, Payload, ResetCause, Setting,
-    SettingKey, SteerData, SteerFlags, Version,
+    ArmData, ArmProfile, BoardStatus, Callsign, Centimetres, LineBits, Payload, Profile,
+    ResetCause, Setting, SettingKey, SettingStatus, SteerData, SteerFlags, Version,
 };
 
 use super::{Bad, Check, Finding, Good, Hint};
@@ -36,6 +37,8 @@ struct Heard {
     steer: Option<SteerData>,
     /// The servos that have answered, one bit each.
     servos: u8,
+    /// Whether the board knows how the arm is described.
+    knows_arm: bool,
     /// The first and the last of its counters.
     status: Option<(BoardStatus, BoardStatus)>,
 }
@@ -71,7 +74,8 @@ pub fn findings(config: &Config) -> Vec<Check> {
             )),
             Ok((found, heard)) => {
                 seen.push(found.role);
-                checks.push((check(found.role), judged(&found, &heard, port)));
+                let told = judged(&found, &heard, port, &config.arm);
+                checks.push((check(found.role), told));
             }
             Err(error) => {
                 let said = format!("{}: {error:#}", port.display());
@@ -102,27 +106,32 @@ fn ask(config: &Config, port: &Path) -> anyhow::Result<(Found, Heard)> {
         found.runs = Runs::Application(up);
     }
     let heard = match found.runs {
-        Runs::Application(up) if up.version == Version::One => listen(&mut line, found.role)?,
+        Runs::Application(up) if up.version == Version::One => {
+            listen(&mut line, found.role, &config.arm)?
+        }
         Runs::Application(_) | Runs::Loader(_) => Heard::default(),
     };
     Ok((found, heard))
 }
 
-fn listen(line: &mut BoardLine, role: Callsign) -> Result<Heard, UpdateError> {
-    let raw_line = |value| {
-        let setting = Setting {
-            key: SettingKey::RawLine,
-            seq: 0,
-            value,
-        };
-        (role == Callsign::Sensor).then_some(Payload::Setting(setting))
+fn listen(line: &mut BoardLine, role: Callsign, arm: &ArmProfile) -> Result<Heard, UpdateError> {
+    let raw_line = |value| Setting {
+        key: SettingKey::RawLine,
+        seq: 0,
+        value,
+    };
+    let told: Vec<Setting> = match role {
+        Callsign::Sensor => vec![raw_line(1)],
+        _ => arm.settings().collect(),
     };
     let mut heard = Heard::default();
-    lager_loader::listen(line, LISTENS, raw_line(1), |payload| heard.take(payload))?;
-    // The bridge asks for them by itself, if somebody wants them.
-    lager_loader::listen(line, LISTENS / 10, raw_line(0), |payload| {
-        heard.take(payload);
-    })?;
+    lager_loader::listen(line, LISTENS, &told, |payload| heard.take(payload))?;
+    if role == Callsign::Sensor {
+        // The bridge asks for them by itself, if somebody wants them.
+        lager_loader::listen(line, LISTENS / 10, &[raw_line(0)], |payload| {
+            heard.take(payload);
+        })?;
+    }
     Ok(heard)
 }
 
@@ -133,6 +142,11 @@ impl Heard {
             Payload::Distance(distance) => self.distance = Some(distance),
             Payload::SteerData(data) => self.steer = Some(data),
             Payload::ArmData(data) => self.servos |= 1 << (data.servo - 1),
+            Payload::SettingReply(reply) if reply.key == ArmProfile::CHECK => {
+                self.knows_arm = reply.status == SettingStatus::Accepted;
+                // Until then it has asked the servos that it knew before.
+                self.servos = 0;
+            }
             Payload::BoardStatus(status) => {
                 let first = self.status.map_or(status, |(first, _)| first);
                 self.status = Some((first, status));
@@ -143,7 +157,7 @@ impl Heard {
 }
 
 /// What a board's words mean.
-fn judged(found: &Found, heard: &Heard, port: &Path) -> Finding {
+fn judged(found: &Found, heard: &Heard, port: &Path, arm: &ArmProfile) -> Finding {
     let (who, port) = (found.role, port.display());
     let up = match found.runs {
         Runs::Loader(None) => {
@@ -178,7 +192,7 @@ fn judged(found: &Found, heard: &Heard, port: &Path) -> Finding {
         return Bad(format!("{is}; {}", faults.join("; ")));
     };
     let told = match found.role {
-        Callsign::Steering => steering(heard, (first, last), &mut faults),
+        Callsign::Steering => steering(heard, (first, last), arm, &mut faults),
         _ => sensor(heard, &mut faults),
     };
     match faults.is_empty() {
@@ -223,6 +237,7 @@ fn sensor(heard: &Heard, faults: &mut Vec<String>) -> String {
 fn steering(
     heard: &Heard,
     (first, last): (BoardStatus, BoardStatus),
+    arm: &ArmProfile,
     faults: &mut Vec<String>,
 ) -> String {
     let Some(data) = heard.steer else {
@@ -238,24 +253,31 @@ fn steering(
             "it refuses words of the sensor board again and again; look at the three wires between the boards".into(),
         );
     }
-    let silent: Vec<String> = (0..ArmData::SERVOS)
-        .filter(|servo| heard.servos >> servo & 1 == 0)
-        .map(|servo| (servo + 1).to_string())
+    if !heard.knows_arm {
+        faults.push(
+            "it has not taken [arm], so nobody knows its servos; `lager board reset steering` restarts it".into(),
+        );
+    }
+    let servos: Vec<(usize, String)> = (0..usize::from(ArmData::SERVOS))
+        .filter_map(|index| {
+            let id = arm.servo_id(index)?;
+            Some((index, format!("{id} ({})", ArmProfile::joint_name(index))))
+        })
         .collect();
-    let troubled: Vec<String> = (0..ArmData::SERVOS)
-        .filter(|servo| heard.servos & data.servo_errors & 1 << servo != 0)
-        .map(|servo| (servo + 1).to_string())
-        .collect();
-    if !silent.is_empty() {
+    let those = |wanted: &dyn Fn(usize) -> bool| {
+        let those = servos.iter().filter(|(index, _)| wanted(*index));
+        let those: Vec<&str> = those.map(|(_, name)| name.as_str()).collect();
+        (!those.is_empty()).then(|| those.join(", "))
+    };
+    let answers = |index: usize| heard.servos >> index & 1 != 0;
+    if heard.knows_arm && let Some(silent) = those(&|index| !answers(index)) {
         faults.push(format!(
-            "servos {} do not answer; look at their supply, their plugs and their ids",
-            silent.join(", ")
+            "servos {silent} do not answer; look at their supply, their plugs and their ids ([arm.servos])"
         ));
     }
-    if !troubled.is_empty() {
+    if let Some(troubled) = those(&|index| answers(index) && data.servo_errors >> index & 1 != 0) {
         faults.push(format!(
-            "servos {} report an error; switch the arm off and on, and let it cool down",
-            troubled.join(", ")
+            "servos {troubled} report an error; switch the arm off and on, and let it cool down"
         ));
     }
     let battery = match data.battery_decivolts {
@@ -265,7 +287,7 @@ fn steering(
     format!(
         "{battery}, {} of {} servos answer, ExDe errors {}",
         heard.servos.count_ones(),
-        ArmData::SERVOS,
+        servos.len(),
         last.exde_errors
     )
 }

@@ -3,10 +3,13 @@
 
 use std::time::Duration;
 
-use lager_plant::{Build, Ranger, Warehouse};
+use lager_plant::{ArmBuild, Build, Ranger, Warehouse};
 use lager_simulator::RobotOptions;
-use lager_topics::{Health, ProfileState, Refusal};
-use lager_wire::{IrModel, LineProfile, RangerProfile, WheelsProfile};
+use lager_topics::{FailureKind, Health, ProfileState, Refusal};
+use lager_wire::{
+    ArmProfile, IrModel, JointServos, LineProfile, OneOrTwo, RangerProfile, ReversedJoints,
+    WheelsProfile,
+};
 
 use super::Whole;
 use crate::config::{BatterySection, Config};
@@ -38,10 +41,40 @@ fn described(build: &Build) -> Config {
         battery: BatterySection {
             divider: Some(build.divider),
         },
+        arm: described_arm(&build.arm),
         ..Config::default()
     };
     config.logic.cruise_mm_per_s *= build.gear as f32;
     config
+}
+
+/// What a person who has found the ids and the directions of the servos writes.
+fn described_arm(arm: &ArmBuild) -> ArmProfile {
+    let id = |index: usize| arm.ids[index].expect("every joint has a first servo");
+    let joint = |first: usize| match arm.ids[first + 1] {
+        Some(second) => OneOrTwo::Two([id(first), second]),
+        None => OneOrTwo::One(id(first)),
+    };
+    let [base, shoulder, _, elbow, _, wrist, rotation, gripper] = arm.reversed;
+    ArmProfile {
+        servos: JointServos {
+            base: id(0),
+            shoulder: joint(1),
+            elbow: joint(3),
+            wrist: id(5),
+            rotation: id(6),
+            gripper: id(7),
+        },
+        reversed: ReversedJoints {
+            base,
+            shoulder,
+            elbow,
+            wrist,
+            rotation,
+            gripper,
+        },
+        ..ArmProfile::default()
+    }
 }
 
 fn robot(config: &Config, build: Build, seed: u64) -> Whole {
@@ -101,6 +134,68 @@ fn a_robot_whose_motors_or_line_sensors_nobody_described_fails_and_says_so() {
         let mut whole = robot(&described(&build), build, 1);
         assert_eq!(whole.run(LIMIT), None, "{build:?}");
     }
+}
+
+/// Builds of the arm alone, and what such a robot says when nobody has described it.
+fn arms() -> [(ArmBuild, Option<FailureKind>); 5] {
+    let reversed = |joints: &[usize]| {
+        let mut arm = ArmBuild::default();
+        for joint in joints {
+            arm.reversed[*joint] = true;
+        }
+        arm
+    };
+    let mut others = ArmBuild::default();
+    others.ids = others.ids.map(|id| id.map(|id| id + 10));
+    let mut single = ArmBuild::default();
+    single.ids[2] = None;
+    [
+        (others, Some(FailureKind::ServoSilent)),
+        (single, Some(FailureKind::ServoSilent)),
+        (reversed(&[0]), None),
+        (reversed(&[1, 2]), None),
+        (reversed(&[3, 4]), None),
+    ]
+}
+
+#[test]
+fn a_robot_whose_arm_nobody_described_fails_and_says_so() {
+    for (arm, kind) in arms() {
+        let build = Build {
+            arm,
+            ..Build::default()
+        };
+        let mut whole = robot(&Config::default(), build, 1);
+        let why = whole.run(LIMIT).expect("it cannot deliver");
+        println!("{arm:?}: {why}");
+        let told = whole.failure_kind().and_then(|told| told.get());
+        assert!(told.is_some(), "{arm:?}: {why}");
+        assert!(kind.is_none() || told == kind, "{arm:?}: {why}");
+        let mut whole = robot(&described(&build), build, 1);
+        assert_eq!(whole.run(LIMIT), None, "{arm:?}");
+        assert_eq!(whole.robot.world().collisions(), 0, "{arm:?}");
+    }
+}
+
+#[test]
+fn an_arm_of_which_servos_do_not_answer_stands_and_the_reason_names_one() {
+    let mut arm = ArmBuild::default();
+    // The base is not where it is told to be; the gripper is.
+    arm.ids[0] = Some(21);
+    arm.ids[5] = Some(22);
+    let build = Build {
+        arm,
+        ..Build::default()
+    };
+    let mut whole = robot(&Config::default(), build, 1);
+    let before = whole.robot.truth().world.servo_positions;
+    let why = whole.run(LIMIT).expect("it cannot deliver");
+    assert!(why.contains("servo 1 of the arm does not answer"), "{why}");
+    assert!(why.contains("silent: 2"), "{why}");
+    let after = whole.robot.truth().world.servo_positions;
+    let moved = after.iter().zip(before).filter(|(after, before)| after.abs_diff(*before) > 3);
+    // What has no torque sinks until the board has brought its servos into service.
+    assert_eq!(moved.count(), 0, "{before:?} {after:?}");
 }
 
 fn health(whole: &Whole) -> Health {

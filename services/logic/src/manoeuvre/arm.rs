@@ -16,6 +16,8 @@
 //! When the steering board or the bridge has restarted, nobody knows where the arm is: without
 //! torque it sags. Then the attempt is repeated and does not count. It is repeated from its
 //! beginning, or from the closing of the claw if the claw would drop the goods otherwise.
+//!
+//! While a servo does not answer, nothing moves: half of an arm does not bring the goods to the claw.
 
 use core::time::Duration;
 
@@ -174,11 +176,18 @@ impl Behaviour for ArmSequence {
 
     /// Gives the next step when the one before has ended.
     fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Ending> {
-        match self.steps.may_go_on(helm) {
-            Err(failed) => return Some(failed),
-            Ok(false) => {}
-            Ok(true) if self.task == Task::Pick => return self.pick(helm),
-            Ok(true) => self.steps.give(ArmCommand::Drop, helm),
+        let silent = helm.senses.arm.silent(&helm.config.arm);
+        match (self.steps.may_go_on(helm), silent) {
+            (Err(_), Some((id, count))) => {
+                let (count, id) = (f32::from(count), f32::from(id));
+                return Some(Ending::Failed(FailureKind::ServoSilent, count, id));
+            }
+            (Err(failed), None) => return Some(failed),
+            (Ok(false), _) => {}
+            // The board may just be bringing it into service.
+            (Ok(true), Some(_)) => self.steps.interrupt(),
+            (Ok(true), None) if self.task == Task::Pick => return self.pick(helm),
+            (Ok(true), None) => self.steps.give(ArmCommand::Drop, helm),
         }
         None
     }
