@@ -56,9 +56,18 @@ fn what_no_arm_can_obey_is_refused_with_the_key() {
         (|arm| arm.carry.elbow = 1_024, "carry"),
         (|arm| arm.servos.base = 254, "[arm.servos] base has id 254"),
         (|arm| arm.servos.gripper = 255, "gripper has id 255"),
-        (|arm| arm.servos.elbow = OneOrTwo::One(254), "elbow has id 254"),
-        (|arm| arm.servos.elbow = OneOrTwo::Two([4, 255]), "from 0 to 253"),
-        (|arm| arm.servos.wrist = 1, "base and wrist have the same id 1"),
+        (
+            |arm| arm.servos.elbow = OneOrTwo::One(254),
+            "elbow has id 254",
+        ),
+        (
+            |arm| arm.servos.elbow = OneOrTwo::Two([4, 255]),
+            "from 0 to 253",
+        ),
+        (
+            |arm| arm.servos.wrist = 1,
+            "base and wrist have the same id 1",
+        ),
         (|arm| arm.servos.rotation = 3, "shoulder and rotation"),
         (
             |arm| arm.servos.shoulder = OneOrTwo::Two([9, 9]),

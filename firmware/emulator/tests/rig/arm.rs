@@ -5,10 +5,10 @@ use std::time::Duration;
 use lager_ax12::ErrorBits;
 use lager_emulator::chip::UsartId;
 use lager_emulator::rig::Board;
-use lager_plant::ServoFault;
+use lager_plant::{ArmBuild, ServoFault};
 use lager_wire::{
-    ArmCommand, ArmProfile, Command, Payload, Profile, Setting, SettingKey, SettingStatus,
-    SteerFlags, WheelCommand,
+    ArmCommand, ArmProfile, Command, OneOrTwo, Payload, Profile, Setting, SettingKey,
+    SettingStatus, SteerFlags, WheelCommand,
 };
 
 use crate::support::Robot;
@@ -79,6 +79,20 @@ fn set(robot: &mut Robot, key: SettingKey, seq: u8, value: i16) -> bool {
             _ => None,
         })
         .expect("the board answers")
+}
+
+/// Tells the board a profile, value by value, and puts it in force.
+fn tell(robot: &mut Robot, profile: &ArmProfile) {
+    for (setting, seq) in profile.settings().zip(1..) {
+        assert!(set(robot, setting.key, seq, setting.value), "{setting:?}");
+    }
+}
+
+/// Packets as the manual writes them.
+fn written(packets: &[Vec<u8>]) -> Vec<String> {
+    let hex = |byte: &u8| format!("{byte:02X}");
+    let line = |packet: &Vec<u8>| packet.iter().map(hex).collect::<Vec<_>>().join(" ");
+    packets.iter().map(line).collect()
 }
 
 /// The packets that write (instruction 3), without the questions.
@@ -176,13 +190,7 @@ fn each_command_writes_its_golden_bytes() {
         robot.rig.servo_wire().record();
         carry_out(&mut robot, command);
         let writes = writes(&robot);
-        let written: Vec<String> = writes
-            .iter()
-            .map(|packet| {
-                let bytes: Vec<String> = packet.iter().map(|byte| format!("{byte:02X}")).collect();
-                bytes.join(" ")
-            })
-            .collect();
+        let written = written(&writes);
         let count = golden.len();
         assert!(written.len() >= count, "{command:?}: {written:#?}");
         assert_eq!(written[..count], *golden, "{command:?}");
@@ -344,4 +352,45 @@ fn the_board_obeys_the_profile_it_is_told() {
     assert_eq!(robot.steering_status().refused, refused + 1);
     let flags = carry_out(&mut robot, ArmCommand::Right);
     assert!(!flags.contains(SteerFlags::REFUSED), "back");
+}
+
+/// A robot whose base has id 21 and counts the other way, and whose shoulder has one servo.
+#[test]
+fn an_arm_that_is_built_otherwise_moves_as_it_is_described() {
+    let mut robot = Robot::new(23);
+    let mut arm = ArmBuild::default();
+    arm.ids[0] = Some(21);
+    arm.ids[2] = None;
+    (arm.reversed[0], arm.reversed[7]) = (true, true);
+    robot.rig.world_mut().servos().fit(&arm);
+    robot.run(Duration::from_millis(1_480));
+    robot.wheels(WheelCommand::Standby);
+    robot.run(Duration::from_millis(20));
+    assert_eq!(robot.report().servo_errors, 0b101, "1 and 3 do not answer");
+    let mut profile = ArmProfile::default();
+    profile.servos.base = 21;
+    profile.servos.shoulder = OneOrTwo::One(2);
+    (profile.reversed.base, profile.reversed.gripper) = (true, true);
+    tell(&mut robot, &profile);
+    robot.run(Duration::from_millis(500));
+    assert_eq!(robot.report().servo_errors, 0);
+
+    let positions = |robot: &mut Robot| robot.rig.world_mut().servos().positions();
+    let before = positions(&mut robot);
+    robot.rig.servo_wire().record();
+    for command in [ArmCommand::Left, ArmCommand::Up] {
+        let flags = carry_out(&mut robot, command);
+        assert!(!flags.contains(SteerFlags::ABORTED), "{command:?}");
+    }
+    let goals = written(&writes(&robot));
+    // To the left from 512 is down to 1023 - 515.
+    assert_eq!(goals[0], "FF FF 15 09 03 1E FC 01 00 00 FF 03 C1");
+    assert_eq!(goals.len(), 2, "{goals:?}");
+    assert!(goals[1].starts_with("FF FF 02 "), "{goals:?}");
+    let after = positions(&mut robot);
+    assert_eq!(after[0] - before[0], 3.0, "to the left");
+    assert_eq!(after[1] - before[1], 3.0, "up");
+    let flags = carry_out(&mut robot, ArmCommand::Squeeze);
+    assert!(!flags.contains(SteerFlags::ABORTED));
+    assert!(positions(&mut robot)[7] < 215.0, "closed on nothing");
 }

@@ -236,8 +236,7 @@ fn act(
         }
         return None;
     }
-    let (servo, fault) =
-        reached.find(|(servo, _)| servo.table[usize::from(ID)] == packet.id)?;
+    let (servo, fault) = reached.find(|(servo, _)| servo.table[usize::from(ID)] == packet.id)?;
     let (errors, registers) = servo.obey(instruction, packet.parameters);
     let delay = u64::from(servo.table[usize::from(RETURN_DELAY_TIME)]) * 2_000;
     let errors = errors.union(fault.errors);

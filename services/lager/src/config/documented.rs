@@ -172,9 +172,7 @@ mod tests {
     use super::*;
     use lager_bridge::buttons::SwitchKind;
     use lager_comm::LinkLost;
-    use lager_wire::{
-        ArmLimits, IrModel, JointLimits, JointServos, OneOrTwo, ReversedJoints,
-    };
+    use lager_wire::{ArmLimits, IrModel, JointLimits, JointServos, OneOrTwo, ReversedJoints};
 
     #[test]
     fn the_documented_file_reads_back_with_every_key() {

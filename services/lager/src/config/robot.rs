@@ -119,10 +119,7 @@ impl Config {
             ),
             model,
             when(!self.robot().steering.divider, "no battery divider"),
-            when(
-                self.arm.servos != usual_arm.servos,
-                "servos with other ids",
-            ),
+            when(self.arm.servos != usual_arm.servos, "servos with other ids"),
             when(self.arm.reversed != usual_arm.reversed, "reversed joints"),
             when(
                 ArmProfile {
@@ -266,8 +263,14 @@ mod tests {
             ("[line]\ndark_is_high = 1\n", "true or false"),
             ("[arm.servos]\nbase = 300\n", "line 2, base = 300"),
             ("[arm.servos]\nbase = 254\n", "[arm.servos] base has id 254"),
-            ("[arm.servos]\nwrist = 8\n", "wrist and gripper have the same id 8"),
-            ("[arm.servos]\nelbow = 300\n", "a whole number from 0 to 255"),
+            (
+                "[arm.servos]\nwrist = 8\n",
+                "wrist and gripper have the same id 8",
+            ),
+            (
+                "[arm.servos]\nelbow = 300\n",
+                "a whole number from 0 to 255",
+            ),
             ("[arm.servos]\nelbow = [4, 5, 6]\n", "the two of a pair"),
             ("[arm.servos]\nelbow = []\n", "the id of one servo"),
             ("[arm.reversed]\nbase = 1\n", "true or false"),

@@ -270,7 +270,9 @@ fn steering(
         (!those.is_empty()).then(|| those.join(", "))
     };
     let answers = |index: usize| heard.servos >> index & 1 != 0;
-    if heard.knows_arm && let Some(silent) = those(&|index| !answers(index)) {
+    if heard.knows_arm
+        && let Some(silent) = those(&|index| !answers(index))
+    {
         faults.push(format!(
             "servos {silent} do not answer; look at their supply, their plugs and their ids ([arm.servos])"
         ));
