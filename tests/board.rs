@@ -236,6 +236,15 @@ fn a_board_restarts_when_it_is_told_and_no_image_that_does_not_fit_touches_it() 
     // Nobody has said that this robot has a divider.
     let battery = "the battery is not measured, 8 of 8 servos answer";
     assert_says(&said, &["ok    steering board", battery]);
+    // The servos are those of the description, and a joint may have one.
+    let as_drawn = fs::read_to_string(&boards.config).expect("a file");
+    let servos = "[arm.servos]\nbase = 21\nshoulder = 2\nelbow = [4, 22]\n";
+    fs::write(&boards.config, as_drawn.clone() + servos).expect("a file");
+    let doctor = boards.run(&domain, &["doctor"]);
+    let silent = "servos 21 (base), 22 (elbow) do not answer";
+    let said = String::from_utf8_lossy(&doctor.stdout);
+    assert_says(&said, &[silent, "5 of 7 servos answer"]);
+    fs::write(&boards.config, as_drawn).expect("a file");
     for board in ["sensor", "steering"] {
         let said = told(&boards.run(&domain, &["board", "reset", board]), 0);
         assert_says(&said, &[&format!("the {board} board"), "has started again"]);

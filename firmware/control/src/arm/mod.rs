@@ -10,9 +10,9 @@
 //! ```
 //!
 //! The profile says which id each number has, whether 3 and 5 exist, and which joints count the other
-//! way. Only [`Arm::ask`] and [`Arm::note`] know ids and turn positions and loads round. When the
-//! profile names other servos, the command under way ends and all of them are brought into service,
-//! which makes them hold where they are.
+//! way. Only `ask` and `note` know ids, and turn positions and loads round. When the profile names
+//! other servos, the command under way ends and all of them are brought into service, which makes
+//! them hold where they are.
 //!
 //! Both directions share one wire. The module uses it for these tasks, most urgent first: the
 //! command under way (`program`), bringing a servo into service, a look at the next servo (a
@@ -29,10 +29,10 @@
 //! A missing servo never delays the others: the board flags it, leaves it out and asks it again in
 //! its turn.
 //!
-//! No command moves a joint out of the limits of the profile. [`lager_wire::ArmProfile::validate`] checks that
-//! the poses lie inside; a step ends at a limit or is refused there. A joint can be outside if
-//! somebody moved it by hand or the limits came later. The board does not move it back by itself:
-//! only steps towards the limits are allowed.
+//! No command moves a joint out of the limits of the profile. A profile counts only if its poses lie
+//! inside; a step ends at a limit or is refused there. A joint can be outside if somebody moved it by
+//! hand or the limits came later. The board does not move it back by itself: only steps towards the
+//! limits are allowed.
 
 mod config;
 mod program;
