@@ -143,6 +143,7 @@ class FailureKind(enum.IntEnum):
     AlreadyOrdered = 32
     GoodsDelivered = 33
     GoodsAway = 34
+    ServoSilent = 35
 
 
 class Remedy(enum.IntEnum):
@@ -585,7 +586,7 @@ class Health(Layout):
 
 class Failure(Layout):
     _type_name_ = "lager::Failure"
-    _hash_ = 0xE09B50DE2397B271
+    _hash_ = 0x91FABE4D028FB99D
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
@@ -605,7 +606,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x351FF1E8976199D4
+    _hash_ = 0x58B994F3F6E8CEFD
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -935,7 +936,7 @@ class OrderQueue(Layout):
 
 class Event(Layout):
     _type_name_ = "lager::Event"
-    _hash_ = 0x3385803A4FFBD6E2
+    _hash_ = 0x2B89F3D334C77537
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -956,7 +957,7 @@ class Event(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0xFDFDE4D837284D31
+    _hash_ = 0x526A78E7F66E841C
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),

@@ -133,6 +133,7 @@ class FailureKind(enum.IntEnum):
     AlreadyOrdered = 32
     GoodsDelivered = 33
     GoodsAway = 34
+    ServoSilent = 35
 
 class Remedy(enum.IntEnum):
     None_ = 0
