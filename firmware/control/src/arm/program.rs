@@ -222,8 +222,8 @@ impl Arm {
     /// Sends servos to their goals, except servos out of service.
     fn go(&mut self, goals: &Goals, manner: Manner, now_us: u32) {
         let mut write = 0;
-        for index in 0..SERVOS {
-            let Some(goal) = goals[index] else { continue };
+        for (index, goal) in goals.iter().enumerate() {
+            let Some(goal) = *goal else { continue };
             self.touched |= bit(index);
             if self.servos[index].is_ready() {
                 self.servos[index].goal = goal;
