@@ -15,6 +15,7 @@ mod logic;
 mod realtime;
 mod robot;
 mod section;
+mod serial;
 mod station;
 
 use std::io::Read as _;
@@ -24,8 +25,6 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
 use lager_battery::Pack;
-use lager_bridge::Ports;
-use lager_bridge::serial::find::DEVICES;
 use lager_home::UnitName;
 use lager_lines::check_names;
 use lager_orders::Pick;
@@ -50,6 +49,7 @@ pub use documented::flag;
 pub use gateway::GatewaySection;
 pub use logic::LogicSection;
 pub use realtime::RealtimeSection;
+pub use serial::{BAUD_RATES, SerialSection};
 pub use station::{CommSection, StationSection};
 
 use section::section;
@@ -59,9 +59,6 @@ use crate::realtime::HIGHEST_PRIORITY;
 
 /// The built-in warehouse of a simulated or emulated robot whose warehouse nobody names.
 pub const SIMULATED_WAREHOUSE: &str = "small";
-
-/// The baud rates of the boards: today's, and the original's (UBRR 103).
-pub const BAUD_RATES: [u32; 2] = [500_000, 9_600];
 
 /// The allowed speeds of a robot's clock; 1 is real time.
 pub const SPEEDS: RangeInclusive<f64> = 0.01..=20.0;
@@ -148,31 +145,6 @@ section! {
 }
 
 section! {
-    "serial"
-    /// The cables to the boards. Without names of ports, the robot listens to each serial device
-    /// (ttyUSB*, ttyACM*) that nobody uses, until both boards have said who they are. It writes to
-    /// none that has not spoken as a board.
-    pub struct SerialSection {
-        /// The ports of the boards, both or none; it does not matter which board is at which port.
-        pub sensor: Option<PathBuf> = None,
-        pub steering: Option<PathBuf> = None,
-        /// The folder with the serial devices, or with links to those of this robot.
-        pub devices: PathBuf = DEVICES.into(),
-        /// Baud rate of both: 500000, or 9600 for boards of the original build.
-        pub baud: u32 = BAUD_RATES[0],
-        /// Whether the sensor board also sends which of its eleven sensors see tape, for the view
-        /// *Line* and for programs. Unset, it does at 500000 Bd, where these bits make a frame
-        /// 0.2 ms later, and not at 9600 Bd, where they would take 11 ms.
-        pub raw_line: Option<bool> = None,
-        /// Whether to drive an original steering board. Its commands have no age limit. Boards of
-        /// this project stop the wheels within 200 ms whatever dies; an original board goes on with
-        /// its last command until the bridge, or its power switch, makes it stand. If false, the
-        /// bridge only makes such a board stand.
-        pub original_boards: bool = false,
-    }
-}
-
-section! {
     "simulator"
     /// The simulated robot and the emulated boards' world.
     pub struct SimulatorSection {
@@ -181,30 +153,6 @@ section! {
         /// How many things come and go on the ways of the simulated floor, at random: 0 to 64. They
         /// need squares of 50 cm or more.
         pub obstacles: u32 = 0,
-    }
-}
-
-impl SerialSection {
-    /// The ports that the configuration names; `None` if the boards have to be found.
-    pub fn named(&self) -> Option<[PathBuf; 2]> {
-        Some([self.sensor.clone()?, self.steering.clone()?])
-    }
-
-    /// Where the boards are.
-    pub fn ports(&self) -> Ports {
-        let found = || Ports::Found(self.devices.clone());
-        self.named().map_or_else(found, Ports::Named)
-    }
-
-    /// The ports, for what stands for the boards at them.
-    pub fn links(&self) -> Result<[PathBuf; 2]> {
-        self.named()
-            .context("[serial] has to name the ports at which the boards are simulated")
-    }
-
-    /// Whether the sensor board is to send its raw readings.
-    pub fn tells_raw_line(&self) -> bool {
-        self.raw_line.unwrap_or(self.baud == BAUD_RATES[0])
     }
 }
 
