@@ -335,7 +335,7 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
 fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
     use lager_topics::LinkHealth;
 
-    let (built, _) = other();
+    let (built, build) = other();
     let (domain, config) = unknown(built);
     let mut robot = up(&domain, &config);
     let bus = Bus::open(&domain.bus("r1", 1.0), Role::Operator).expect("the bus opens");
@@ -376,7 +376,7 @@ fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
         assert_eq!(last, Some("nothing is written"));
     }
     let kept = fs::read_to_string(domain.folder().join("robot.toml"));
-    assert_eq!(kept.expect("the file"), "");
+    assert_eq!(kept.expect("the file"), arm(&build.arm));
     let undone = domain.run(&["commission", "--undo", "--config", &config]);
     assert_eq!(undone.status.code(), Some(1), "there is nothing to undo");
     drop((health, bus));

@@ -11,8 +11,10 @@ use serde_json::Value;
 
 use crate::error::GuardError;
 
-/// The sources of counts: callgrind, and the emulator of the chips.
+/// The sources of counts: callgrind, qemu's count on a Raspberry Pi's processor, and the emulator of
+/// the chips.
 pub(crate) const INSTRUCTIONS: &str = "instructions";
+pub(crate) const AARCH64: &str = "instructions-aarch64";
 pub(crate) const CYCLES: &str = "cycles";
 
 /// The figures of one source.
@@ -123,6 +125,23 @@ impl Figures {
         }
     }
 
+    /// The instruction counts of `tests/aarch64/run`, a line `FIGURE COUNT` for each step.
+    pub(crate) fn of_qemu(file: &Path, text: &str, built: Built) -> Result<Self, GuardError> {
+        let mut figures = Self::from_source(AARCH64);
+        figures.built = Some(Built {
+            target: "aarch64-unknown-linux-gnu".to_owned(),
+            ..built
+        });
+        for line in text.lines() {
+            let (name, count) = line
+                .split_once(' ')
+                .and_then(|(name, count)| Some((name, count.parse::<u32>().ok()?)))
+                .ok_or_else(|| not_counts(file, &format!("`{line}` is no figure")))?;
+            figures.add(name.to_owned(), vec![count.into()])?;
+        }
+        Ok(figures)
+    }
+
     /// The cycles of the boards' images for the figures that have a limit. `lager bench chip`
     /// reports the other figures.
     pub(crate) fn of_chips(
@@ -172,7 +191,9 @@ impl Figures {
 }
 
 fn not_counts(file: &Path, why: &dyn std::fmt::Display) -> GuardError {
-    let why = format!("these are no counts ({why}); run `benches/guard`, which makes them");
+    let why = format!(
+        "these are no counts ({why}); run `benches/guard`, or `tests/aarch64/run` for aarch64, which makes them"
+    );
     GuardError::Unusable(file.to_owned(), why)
 }
 
@@ -251,6 +272,23 @@ mod tests {
     fn two_rows_of_one_name_are_refused() {
         let twice = of_report(&format!("{ROW},{ROW}"));
         assert!(matches!(twice, Err(GuardError::Twice(..))), "{twice:?}");
+    }
+
+    #[test]
+    fn a_step_on_aarch64_is_a_line() {
+        let read = |text: &str| Figures::of_qemu(Path::new("f"), text, built());
+        let figures = read("publish/to-1 910\npublish/to-64 3000\n").unwrap();
+        assert_eq!(figures.get("publish/to-64"), Some(3000.0));
+        let built = figures.built.unwrap();
+        assert_eq!(built.target, "aarch64-unknown-linux-gnu");
+        for wrong in [
+            "publish/to-1",
+            "publish/to-1 -3",
+            "publish/to-1 \n",
+            "a 1\na 2",
+        ] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ use lager_benches::{Scenario, at_least_one, machine, median};
 use serde::Serialize;
 
 use crate::error::{GuardError, read};
-use crate::figures::{Built, CYCLES, Figures, INSTRUCTIONS};
+use crate::figures::{AARCH64, Built, CYCLES, Figures, INSTRUCTIONS};
 use crate::judge::{Judgement, Verdict, judge};
 use crate::limits::Limits;
 use crate::measure::measure;
@@ -60,6 +60,9 @@ struct Arguments {
     /// Instruction counts as gungraun writes them (the script gives this)
     #[arg(long, value_name = "FILE", hide = true)]
     callgrind: Option<PathBuf>,
+    /// Instruction counts on aarch64, which `tests/aarch64/run` makes and gives
+    #[arg(long, value_name = "FILE", hide = true)]
+    aarch64: Option<PathBuf>,
 }
 
 /// The guard's results.
@@ -105,7 +108,12 @@ impl Guard {
             let known = sources.join(", ");
             return Err(GuardError::NoSuchSource(unknown.clone(), known));
         }
-        sources.retain(|source| only.is_empty() || only.contains(source));
+        // The counts of another processor need its compiler and an emulator, which few machines have.
+        let is_usual = |source: &String| source != AARCH64 || arguments.aarch64.is_some();
+        sources.retain(|source| match only.is_empty() {
+            true => is_usual(source),
+            false => only.contains(source),
+        });
         Ok(Self {
             arguments,
             limits,
@@ -135,7 +143,11 @@ impl Guard {
             notes: Vec::new(),
         };
         for source in &self.sources {
-            let figures = match (Scenario::from_str(source, false), &self.arguments.callgrind) {
+            let counts = match source.as_str() {
+                AARCH64 => &self.arguments.aarch64,
+                _ => &self.arguments.callgrind,
+            };
+            let figures = match (Scenario::from_str(source, false), counts) {
                 (Ok(scenario), _) => {
                     let (runs, attempts) = (self.arguments.runs, self.arguments.attempts);
                     let (figures, times) = measure(limits, scenario, runs, attempts)?;
@@ -151,6 +163,9 @@ impl Guard {
                 })?,
                 (Err(_), Some(file)) if source == INSTRUCTIONS => {
                     Figures::of_callgrind(file, &read(file)?, Built::by_rustc()?)?
+                }
+                (Err(_), Some(file)) if source == AARCH64 => {
+                    Figures::of_qemu(file, &read(file)?, Built::by_rustc()?)?
                 }
                 (Err(_), _) => return Err(GuardError::NoCounts(source.clone())),
             };

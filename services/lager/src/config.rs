@@ -161,6 +161,7 @@ section! {
     }
 }
 
+<<<<<<< HEAD
 impl SimulatorSection {
     /// How the simulated robot is built.
     pub fn build(&self) -> Build {
@@ -168,6 +169,8 @@ impl SimulatorSection {
     }
 }
 
+=======
+>>>>>>> 9269741ff32c4526f24aac265e8c4476e5e90ad7
 impl Config {
     /// Reads `path`, where `-` is standard input. Without a path it reads `lager.toml` in the
     /// current folder, or takes the defaults if there is none.
