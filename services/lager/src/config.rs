@@ -153,7 +153,8 @@ section! {
         /// Seed of how the simulated robot is built: which motors are swapped or reversed, how fast it
         /// is, which way round its line sensors read, which ranger it has, whether its battery is
         /// measured, and which servos its arm has. Unset, it is built as the defaults of [wheels],
-        /// [line], [distance], [battery] and [arm] say. Another robot drives well only when somebody has described it (`lager commission`).
+        /// [line], [distance], [battery] and [arm] say. Another robot drives well only when somebody
+        /// has described it (`lager commission`).
         pub built: Option<u64> = None,
         /// How many things come and go on the ways of the simulated floor, at random: 0 to 64. They
         /// need squares of 50 cm or more.
@@ -161,7 +162,6 @@ section! {
     }
 }
 
-<<<<<<< HEAD
 impl SimulatorSection {
     /// How the simulated robot is built.
     pub fn build(&self) -> Build {
@@ -169,8 +169,6 @@ impl SimulatorSection {
     }
 }
 
-=======
->>>>>>> 9269741ff32c4526f24aac265e8c4476e5e90ad7
 impl Config {
     /// Reads `path`, where `-` is standard input. Without a path it reads `lager.toml` in the
     /// current folder, or takes the defaults if there is none.

@@ -1,16 +1,8 @@
-<<<<<<< HEAD
 //! `[serial]`: the cables to the boards.
 
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
-=======
-//! The serial ports of the boards.
-
-use std::path::PathBuf;
-
-use anyhow::{Context, Result};
->>>>>>> 9269741ff32c4526f24aac265e8c4476e5e90ad7
 use lager_bridge::Ports;
 use lager_bridge::serial::find::DEVICES;
 
@@ -66,7 +58,6 @@ impl SerialSection {
     pub fn tells_raw_line(&self) -> bool {
         self.raw_line.unwrap_or(self.baud == BAUD_RATES[0])
     }
-<<<<<<< HEAD
 
     /// Refuses cables that cannot be used. The error is a sentence.
     pub fn validate(&self) -> Result<()> {
@@ -84,6 +75,4 @@ impl SerialSection {
         }
         Ok(())
     }
-=======
->>>>>>> 9269741ff32c4526f24aac265e8c4476e5e90ad7
 }
