@@ -247,7 +247,9 @@ impl Config {
 
 /// Where the text stands that a description had before it was written.
 fn before_of(path: &Path) -> PathBuf {
-    path.with_added_extension("before")
+    let mut name = path.as_os_str().to_owned();
+    name.push(".before");
+    name.into()
 }
 
 /// Takes a section over, unless the configuration says something else.
