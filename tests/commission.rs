@@ -368,6 +368,10 @@ fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
             }
         }
         described("a trial", &|now| now != before);
+        let second = domain.run(&["commission", "--config", &config]);
+        let said = String::from_utf8_lossy(&second.stderr).into_owned();
+        let first = format!("process {}", person.child.id());
+        assert!(!second.status.success() && said.contains(&first), "{said}");
         end(&mut person);
         let _ = wait_for("its end", || person.child.try_wait().expect("a child"));
         described("what was before", &|now| now == before);

@@ -24,6 +24,7 @@ use lager_home::Clock;
 use lager_lines::splitter::LineSplitter;
 use lager_orders::{Language, Moment};
 use lager_ports::{Bus, BusConfig, Subscriber};
+use lager_station::files::Hold;
 use lager_supervisor::console;
 use lager_supervisor::hands::Hands;
 use lager_topics::{
@@ -58,6 +59,9 @@ const WIDTH: usize = 76;
 pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> Result<ExitCode> {
     let running = configured.of_running_robot()?;
     let running = running.unwrap_or_else(|| configured.clone());
+    // It must have a place before a person works for a quarter of an hour, and two people would try
+    // two descriptions on one robot.
+    let _only_one = Hold::of(&running.place_of_description()?)?;
     if args.undo {
         let path = running.forget_description()?;
         let said = format!(
@@ -69,8 +73,6 @@ pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> R
     }
     diagnose::must_be_up(configured)?;
     let patience = TimeLimit::in_order(configured, shutdown)?;
-    // It must have a place before a person works for a quarter of an hour.
-    running.place_of_description()?;
     let BusConfig { speed, clock, .. } = running.bus()?;
     let bus = BusConfig {
         speed,

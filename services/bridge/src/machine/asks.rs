@@ -7,11 +7,12 @@ use core::time::Duration;
 
 use lager_orders::lease::LATEST_MOVE_NS;
 use lager_orders::{Mode, Moment};
-use lager_topics::{Ask, AskKind, BridgeAnswer, Outcome, ProfileState};
+use lager_topics::{Ask, AskKind, BridgeAnswer, Outcome, Part, ProfileState};
 use lager_wire::{Callsign, Command, SettingKey, Version, WheelCommand};
 
 use super::effect::Notice;
 use super::{Asked, BridgeCore};
+use crate::frames::ServoTable;
 use crate::settings::{self, Progress};
 
 impl BridgeCore {
@@ -108,6 +109,10 @@ impl BridgeCore {
             return Asked::Answered(Outcome::Refused);
         }
         self.heed_profiles(before);
+        if part == Part::Arm {
+            // Other servos may stand there now, and none of these has been heard.
+            self.servos = ServoTable::default();
+        }
         self.due.health = true;
         Asked::Describing(part)
     }
@@ -218,7 +223,7 @@ impl BridgeCore {
 
 #[cfg(test)]
 mod tests {
-    use lager_topics::{Origin, Part, SteeringOrder};
+    use lager_topics::{Origin, SteeringOrder};
     use lager_wire::{Packet, Payload, ResetOrder};
 
     use super::super::tests::{FOLLOW, IDLE, STEERING, at, core, options, report, sensor_up, turn};
