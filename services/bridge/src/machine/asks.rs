@@ -1,4 +1,5 @@
-//! Requests: to change the mode, to release a stop, and to set values of the boards.
+//! Requests: to change the mode, to release a stop, to set values of the boards, to have them told how
+//! the robot is built, and to restart them.
 //!
 //! They stand apart because an answer may have to wait for a board or for the stop word, and the
 //! core's turns go on meanwhile. One request is under way at a time.
