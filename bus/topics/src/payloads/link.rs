@@ -251,7 +251,7 @@ impl Health {
 
     /// Whether both boards are up, and nobody is telling them how their robot is built.
     pub fn boards_are_ready(&self) -> bool {
-        let told = [self.sensor_profile, self.steering_profile];
+        let told = [self.sensor_profile, self.steering_profile, self.arm_profile];
         self.sensor.up != 0
             && self.steering.up != 0
             && told.iter().all(|told| *told != ProfileState::Telling)

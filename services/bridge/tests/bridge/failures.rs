@@ -210,7 +210,7 @@ fn a_restarted_bridge_goes_on_beside_running_boards() {
     let mut robot = Robot::autonomous();
     let supervisor = robot.isolation.open(Role::Supervisor);
     let mut keeper = supervisor.keeper::<LinkHealth>().unwrap();
-    let id = robot.hands.carry_out(logic(1, LEFT_PERP));
+    let id = robot.hands.carry_out(logic(1, LEFT_PERP)).finished_id;
     let turns = robot.steering.with(|board| board.count(LEFT_PERP));
     robot.hands.stop();
     robot
@@ -244,7 +244,7 @@ fn a_restarted_bridge_goes_on_beside_running_boards() {
         });
     assert_eq!(steering.with(|board| board.count(LEFT_PERP)), turns);
     robot.hands.resume();
-    let tries = robot.hands.carry_out(logic(id + 1, LEFT_PERP)) - id;
+    let tries = robot.hands.carry_out(logic(id + 1, LEFT_PERP)).finished_id - id;
     let done = robot.steering.with(|board| board.count(LEFT_PERP)) - turns;
     assert!(
         (1..=tries as usize).contains(&done),

@@ -87,7 +87,7 @@ fn a_turn_of_an_original_board_ends_after_its_time() {
     robot.start();
     robot.wait_until_up();
     robot.hands.set_mode(Mode::Autonomous);
-    let id = robot.hands.carry_out(logic(1, LEFT_PERP));
+    let id = robot.hands.carry_out(logic(1, LEFT_PERP)).finished_id;
     let steering = &robot.steering;
     robot
         .hands

@@ -100,16 +100,9 @@ fn an_order_drives_the_robot_for_as_long_as_it_is_renewed() {
 fn the_servos_of_an_arm_step_are_known_when_it_ends() {
     let mut robot = Robot::up();
     let up = operator(5, Command::Arm(ArmCommand::Up));
-    robot.hands.give_until(up, "the step is done", |hands| {
-        hands.state.drain().iter().any(|state| {
-            let done = state.finished_id == 5 && state.finish.get() == Some(Finish::Done);
-            if done {
-                assert_eq!((state.servo_position[2], state.servo_load[2]), (700, -12));
-                assert_eq!(state.servo_position[0], lager_topics::SERVO_UNKNOWN);
-            }
-            done
-        })
-    });
+    let state = robot.hands.carry_out(up);
+    assert_eq!((state.servo_position[2], state.servo_load[2]), (700, -12));
+    assert_eq!(state.servo_position[0], lager_topics::SERVO_UNKNOWN);
 }
 
 #[test]

@@ -235,24 +235,27 @@ impl Hands {
         }
     }
 
-    /// Renews `order` until its one-shot command is carried out, and returns its number then. Where
-    /// this machine was held up for longer than an order lasts, the command was cut short; it is
-    /// ordered anew under the next number.
-    pub(crate) fn carry_out(&mut self, mut order: SteeringOrder) -> u32 {
+    /// Renews `order` until its one-shot command is carried out, and returns the report that says
+    /// so, which has its number. Where this machine was held up for longer than an order lasts, the
+    /// command was cut short or came too late; it is ordered anew under the next number.
+    pub(crate) fn carry_out(&mut self, mut order: SteeringOrder) -> SteeringReport {
         loop {
-            let mut finish = None;
+            let mut ended = None;
             self.give_until(order, "the command has ended", |hands| {
-                let reports = hands.state.drain();
-                let own = reports.iter().find(|state| {
+                let mut reports = hands.state.drain().into_iter();
+                ended = reports.find(|state| {
                     (state.finished_id, state.finished_origin) == (order.id, order.origin)
                 });
-                finish = own.map(|state| state.finish.get());
-                finish.is_some()
+                let health = hands.health.look().unwrap_or_default();
+                ended.is_some() || health.refused_id == order.id
             });
-            if finish == Some(Some(Finish::Done)) {
-                return order.id;
+            if let Some(done) = ended.filter(|state| state.finish == Finish::Done) {
+                return done;
             }
             order.id += 1;
+            if order.given_ns != 0 {
+                order.given_ns = Clock::monotonic_ns();
+            }
         }
     }
 
