@@ -26,7 +26,7 @@ function picture() {
   if (wasStopped && !isStopped) stop.say(null);
   wasStopped = isStopped;
   show(face(link, seen, performance.now()), seen);
-  put(at("whose"), name() ?? "");
+  put(at("whose"), name() ?? say("robot"));
   const { mode } = seen?.state ?? {};
   const waits = seen?.queue.length ? say("orders_wait", seen.queue.length) : "";
   put(at("figures"), [mode ? say(`mode_${mode}`) : "", battery(seen?.state ?? {}).words, waits].filter(Boolean).join(" \u00b7 "));
