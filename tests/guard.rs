@@ -6,8 +6,12 @@
 //! shows the opposite, that unchanged code keeps its limits: it runs the guard itself with the same
 //! build.
 
-use std::process::Command;
+use core::time::Duration;
+use std::fs;
+use std::process::{Command, Stdio};
 
+use lager_rig::proc;
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 /// The guard's output.
@@ -18,10 +22,19 @@ struct Said {
 }
 
 fn guard(arguments: &[&str]) -> Said {
+    guard_beside(arguments, |_| ())
+}
+
+/// Runs the guard, and `work` beside it, which gets the process's number.
+fn guard_beside(arguments: &[&str], work: impl FnOnce(u32)) -> Said {
     let _alone = lager_tests::alone();
     let guard = lager_tests::in_tree("benches/guard");
     let mut command = Command::new(guard);
-    let output = command.args(arguments).arg("--json").output().unwrap();
+    command.args(arguments).arg("--json");
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    work(child.id());
+    let output = child.wait_with_output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let everything = format!("{text}{}", String::from_utf8_lossy(&output.stderr));
     let findings: Value = serde_json::from_str(&text).unwrap_or_default();
@@ -105,4 +118,74 @@ fn a_source_without_limits_is_refused() {
         "{}",
         said.everything
     );
+}
+
+/// The logics of the measured robots. The script becomes the guard, whose children they are.
+fn logics(guard: u32) -> Vec<u32> {
+    let is_logic = |process: &u32| {
+        let variables = fs::read(format!("/proc/{process}/environ")).unwrap_or_default();
+        let name = b"LAGER_PROCESS=path, logic";
+        variables.split(|byte| *byte == 0).any(|one| one == name)
+    };
+    proc::children(guard).into_iter().filter(is_logic).collect()
+}
+
+fn signal(process: u32, signal: Signal) {
+    // It may have ended meanwhile.
+    let process = Pid::from_raw(process.cast_signed()).unwrap();
+    let _ = kill_process(process, signal);
+}
+
+/// Lets no logic run until the measurement has ended for this reason.
+fn freeze_the_logics(guard: u32) {
+    let sleep = || std::thread::sleep(Duration::from_millis(5));
+    let is_up = || fs::exists(format!("/proc/{guard}")).unwrap_or(false);
+    let found = loop {
+        match logics(guard) {
+            found if !found.is_empty() || !is_up() => break found,
+            _ => sleep(),
+        }
+    };
+    while logics(guard).iter().any(|logic| found.contains(logic)) {
+        // A chain whose turn comes is told to run, so it is told again and again.
+        logics(guard).iter().for_each(|logic| signal(*logic, Signal::STOP));
+        sleep();
+    }
+    // Those of the next measurement.
+    logics(guard).iter().for_each(|logic| signal(*logic, Signal::CONT));
+}
+
+const PATH_ONCE: [&str; 6] = ["--only", "path", "--runs", "1", "--attempts", "2"];
+
+#[test]
+#[ignore = "as above"]
+fn a_measurement_that_ended_because_the_machine_was_held_up_is_made_again() {
+    let said = guard_beside(&PATH_ONCE, |guard| {
+        std::thread::scope(|scope| {
+            scope.spawn(|| freeze_the_logics(guard));
+            while logics(guard).is_empty() {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            // As if another machine had this one's cores.
+            signal(guard, Signal::STOP);
+            std::thread::sleep(Duration::from_millis(300));
+            signal(guard, Signal::CONT);
+        });
+    });
+    // What the second one measured beside other tests is not judged here.
+    assert!(matches!(said.code, Some(0 | 1)), "{}", said.everything);
+    let why = "gave a core to nobody here";
+    assert!(said.everything.contains(why), "{}", said.everything);
+}
+
+#[test]
+#[ignore = "as above"]
+fn a_measurement_that_ended_on_a_machine_that_ran_is_not_made_again() {
+    let said = guard_beside(&PATH_ONCE, freeze_the_logics);
+    // If this machine was really held up, there is nothing to see.
+    if !said.everything.contains("gave a core to nobody here") {
+        assert_eq!(said.code, Some(2), "{}", said.everything);
+        let why = "the other process stands still";
+        assert!(said.everything.contains(why), "{}", said.everything);
+    }
 }

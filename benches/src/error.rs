@@ -58,9 +58,27 @@ pub enum BenchError {
     /// The emulator gave no figures, with its own message.
     #[error("{0} measured nothing ({1}); build it and the images again with `.ci/firmware`")]
     Emulator(PathBuf, String),
+    /// A sample or a process was silent, on a machine that gave a core to nobody here for that time.
+    #[error("{0}. Meanwhile this machine gave a core to nobody here for {1:?}, which may be why")]
+    HeldUp(Box<BenchError>, Duration),
     /// The user wants to stop.
     #[error("interrupted; nothing was left behind")]
     Interrupted,
+}
+
+impl BenchError {
+    /// Whether something did not come in time, as also happens on a machine that is held up.
+    pub(crate) fn is_silence(&self) -> bool {
+        matches!(
+            self,
+            Self::Alone(_)
+                | Self::Process(ProcessError::Silent { .. })
+                | Self::Failed {
+                    fault: Fault::Silent(_) | Fault::Starved(_),
+                    ..
+                }
+        )
+    }
 }
 
 /// What is wrong with a sample.

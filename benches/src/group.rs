@@ -5,14 +5,18 @@
 //! ([`Group::measure`]), criterion times single rows ([`Group::open`]). The scenario defines a
 //! round; nothing here reads a clock.
 
+use core::time::Duration;
 use std::io::{IsTerminal, Write};
 
-use lager_rig::{heed_interrupts, interrupted};
+use lager_rig::{Watch, heed_interrupts, interrupted};
 
 use crate::error::BenchError;
 use crate::machine::kept_awake;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
 use crate::stats::{Quantiles, median};
+
+/// From this time on a core was held up. A robot's leases and reports are as long, so it stands.
+const HELD_UP: Duration = Duration::from_millis(100);
 
 /// One line of a report before it is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,8 +95,10 @@ impl Group {
     /// right to real time, prints a sentence and leaves out what needs that right.
     ///
     /// # Errors
-    /// A session failed, or the user wants to stop.
+    /// A session failed, or the user wants to stop. If this machine was held up when something did
+    /// not come in time, the error says so ([`BenchError::HeldUp`]).
     pub(crate) fn measure(self, options: &Options) -> Result<Vec<Row>, BenchError> {
+        let watch = Watch::begin();
         let measured = std::thread::scope(|scope| {
             let measuring = scope.spawn(move || self.open_and_measure(options));
             let joined = measuring.join();
@@ -103,6 +109,10 @@ impl Group {
                 eprintln!("{error}");
                 Ok(Vec::new())
             }
+            Err(error) if error.is_silence() => Err(match watch.end() {
+                held_up if held_up >= HELD_UP => BenchError::HeldUp(Box::new(error), held_up),
+                _ => error,
+            }),
             measured => measured,
         }
     }

@@ -48,7 +48,8 @@ struct Arguments {
     /// Runs of each measurement; a ratio is the median over them
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
     runs: usize,
-    /// How often to measure a scenario while one of its limits is broken; all runs count together
+    /// How often to measure a scenario while a limit is broken or the machine is held up; all runs
+    /// count together
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
     attempts: usize,
     /// Judge nothing: measure each scenario N times, and show how far its figures spread
@@ -150,12 +151,8 @@ impl Guard {
             let figures = match (Scenario::from_str(source, false), counts) {
                 (Ok(scenario), _) => {
                     let (runs, attempts) = (self.arguments.runs, self.arguments.attempts);
-                    let (figures, times) = measure(limits, scenario, runs, attempts)?;
-                    if times > 1 {
-                        findings.notes.push(format!(
-                            "{source}: measured {times} times because a limit was broken; the medians of all runs count"
-                        ));
-                    }
+                    let (figures, notes) = measure(limits, scenario, runs, attempts)?;
+                    findings.notes.extend(notes);
                     figures
                 }
                 (Err(_), _) if source == CYCLES => Figures::of_chips(chips()?, |name| {

@@ -2,32 +2,49 @@
 //!
 //! **Why again:** other work on the machine comes and goes, and may disturb most of three runs. The
 //! median of all runs of all measurements counts, so one lucky run does not hide code that is
-//! slower than its limit.
+//! slower than its limit. A measurement that ended early because the machine was held up has no
+//! figures, and is made again, too. One that ended early on any other machine is the guard's end.
 
-use lager_benches::{Options, Scenario, may_have_real_time};
+use lager_benches::{BenchError, Options, Scenario, may_have_real_time};
 
 use crate::error::GuardError;
 use crate::figures::{Figures, RatioName};
 use crate::judge::judge;
 use crate::limits::Limits;
 
-/// Measures `scenario` until its limits are kept, at most `attempts` times. Returns the figures and
-/// the number of measurements.
+/// Measures `scenario` until its limits are kept, at most `attempts` times. Returns the figures,
+/// and a note for each measurement that was not the last one.
 pub(crate) fn measure(
     limits: &Limits,
     scenario: Scenario,
     runs: usize,
     attempts: usize,
-) -> Result<(Figures, usize), GuardError> {
-    let mut figures = once(limits, scenario, runs)?;
-    for attempt in 1..attempts {
-        let (judgements, _) = judge(limits, &figures);
-        if !judgements.iter().any(|one| one.verdict.fails()) {
-            return Ok((figures, attempt));
+) -> Result<(Figures, Vec<String>), GuardError> {
+    let mut figures: Option<Figures> = None;
+    let mut notes = Vec::new();
+    for left in (0..attempts).rev() {
+        match once(limits, scenario, runs) {
+            Err(GuardError::Scenario(_, error @ BenchError::HeldUp(..))) if left > 0 => {
+                notes.push(format!("{scenario}: measured again: {error}"));
+            }
+            Err(error) => return Err(error),
+            Ok(more) => {
+                let all = match figures.take() {
+                    Some(before) => before.pooled_with(more),
+                    None => more,
+                };
+                let (judgements, _) = judge(limits, &all);
+                if left == 0 || !judgements.iter().any(|one| one.verdict.fails()) {
+                    return Ok((all, notes));
+                }
+                notes.push(format!(
+                    "{scenario}: measured again, because a limit was broken; the medians of all runs count"
+                ));
+                figures = Some(all);
+            }
         }
-        figures = figures.pooled_with(once(limits, scenario, runs)?);
     }
-    Ok((figures, attempts))
+    unreachable!("there is at least one attempt, and the last one returns")
 }
 
 /// Measures `scenario` once.

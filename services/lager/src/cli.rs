@@ -155,7 +155,7 @@ pub enum Command {
     Ordered(Ordered),
     /// Find out what is wrong with this machine and how to mend it
     Doctor {
-        /// Remove what dead processes left on the bus
+        /// Remove what dead processes left on the bus, and restart a board that answers and does not work
         #[arg(long)]
         fix: bool,
         /// Print one line of JSON

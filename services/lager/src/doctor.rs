@@ -1,7 +1,7 @@
 //! `lager doctor`: says what is wrong with this machine, and how to mend it.
 //!
 //! Each check looks at one thing and returns a finding. Only `--fix` changes anything: it removes
-//! what dead processes left on the bus. This process opens nothing of the bus that could block it.
+//! what dead processes left on the bus, and restarts a board that answers and does not work. This process opens nothing of the bus that could block it.
 
 mod boards;
 mod realtime;
@@ -69,7 +69,7 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
         ("versions", versions()),
         ("calendar", calendar()),
     ];
-    checks.extend(boards::findings(config));
+    checks.extend(boards::findings(config, fix));
     checks.extend(realtime::findings(config));
     // Bad results come first.
     checks.sort_by_key(|(_, finding)| !matches!(finding, Bad(_)));
@@ -85,6 +85,19 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
 }
 
 impl Finding {
+    /// This finding about a board, which was restarted before if `was_restarted`.
+    fn after(self, was_restarted: bool) -> Self {
+        let told = |said| match was_restarted {
+            true => format!("it was restarted; {said}"),
+            false => said,
+        };
+        match self {
+            Good(said) => Good(told(said)),
+            Hint(said) => Hint(told(said)),
+            Bad(said) => Bad(told(said)),
+        }
+    }
+
     fn mark(&self) -> &'static str {
         match self {
             Good(_) => "ok",

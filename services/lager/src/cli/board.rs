@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
+use lager_loader::fuses;
 use lager_wire::Callsign;
 
 use super::values;
@@ -46,6 +47,7 @@ The boards keep their settings.")]
   lager board flash steering --programmer stk500v2 --port /dev/ttyACM0
   lager board flash sensor --programmer jtagice3 --port usb --dry-run
   lager board flash sensor --programmer usbasp --bit-clock 10   a new chip runs at 1 MHz, so slowly
+  lager board flash sensor --programmer usbasp --clock external  an oscillator in place of the crystal
 
 It runs avrdude, which must be installed; `avrdude -c ?` lists the programmers. It reads the chip's
 signature first and leaves another chip alone. It erases the board's program and keeps its settings.
@@ -98,6 +100,9 @@ pub struct FlashArgs {
     /// How long a bit takes on the programmer's wires, in microseconds [default: avrdude's]
     #[arg(long, value_name = "US", allow_negative_numbers = true, value_parser = values::bit_clock)]
     pub bit_clock: Option<f64>,
+    /// Where the board's clock of 16 MHz comes from
+    #[arg(long, value_name = "SOURCE", default_value = "crystal")]
+    pub clock: BoardClock,
     /// The bootloader's .hex file [default: the board's own, beside the images]
     #[arg(long, value_name = "FILE")]
     pub loader: Option<PathBuf>,
@@ -114,6 +119,25 @@ pub struct ResetArgs {
     /// Where the boards are
     #[command(flatten)]
     pub ports: PortArgs,
+}
+
+/// What gives a board its clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BoardClock {
+    /// A crystal at XTAL1 and XTAL2
+    Crystal,
+    /// An oscillator at XTAL1. A chip that was told so and has none answers no programmer
+    External,
+}
+
+impl BoardClock {
+    /// The chip's low fuse.
+    pub fn low_fuse(self) -> u8 {
+        match self {
+            Self::Crystal => fuses::LOW,
+            Self::External => fuses::LOW_EXTERNAL,
+        }
+    }
 }
 
 /// A board, by its name.

@@ -4,7 +4,7 @@
 //! It opens the ports as the bridge does and takes the robot's name meanwhile, so no robot starts
 //! beside it. It gives no command, so nothing moves. It only asks the sensor board for its raw
 //! readings, and tells the steering board how the arm is described, because it then asks those servos.
-//! A board forgets both at its next start.
+//! A board forgets both at its next start. `--fix` restarts a board that answers and does not work.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -44,8 +44,8 @@ struct Heard {
     status: Option<(BoardStatus, BoardStatus)>,
 }
 
-/// The findings about both boards of a real robot.
-pub fn findings(config: &Config) -> Vec<Check> {
+/// The findings about both boards of a real robot. `fix` restarts a board that needs it.
+pub fn findings(config: &Config, fix: bool) -> Vec<Check> {
     if config.body != Body::Serial {
         return Vec::new();
     }
@@ -67,8 +67,8 @@ pub fn findings(config: &Config) -> Vec<Check> {
         None => found(config, &mut checks),
     };
     for port in &ports {
-        match ask(config, port) {
-            Ok((found, _)) if seen.contains(&found.role) => checks.push((
+        match ask(config, port, fix) {
+            Ok((found, _, _)) if seen.contains(&found.role) => checks.push((
                 check(found.role),
                 Bad(format!(
                     "the board at {} is a {} board, too; give each board the image of its own with `lager board flash`",
@@ -76,10 +76,10 @@ pub fn findings(config: &Config) -> Vec<Check> {
                     found.role
                 )),
             )),
-            Ok((found, heard)) => {
+            Ok((found, heard, was_restarted)) => {
                 seen.push(found.role);
                 let told = judged(&found, &heard, port, &config.arm);
-                checks.push((check(found.role), told));
+                checks.push((check(found.role), told.after(was_restarted)));
             }
             Err(error) => {
                 let said = format!("{}: {error:#}", port.display());
@@ -124,7 +124,8 @@ fn check(board: Callsign) -> &'static str {
     }
 }
 
-fn ask(config: &Config, port: &Path) -> anyhow::Result<(Found, Heard)> {
+/// Asks a board. Returns whether it was restarted before it said this, too.
+fn ask(config: &Config, port: &Path, fix: bool) -> anyhow::Result<(Found, Heard, bool)> {
     // Whoever ends the doctor ends this process.
     let mut line = board::open(config, port, None, &Shutdown::new())?;
     let mut found = lager_loader::find(&mut line)?;
@@ -133,28 +134,51 @@ fn ask(config: &Config, port: &Path) -> anyhow::Result<(Found, Heard)> {
     {
         found.runs = Runs::Application(up);
     }
-    let heard = match found.runs {
-        Runs::Application(up) if up.version == Version::One => {
-            listen(&mut line, found.role, &config.arm)?
-        }
-        Runs::Application(_) | Runs::Loader(_) => Heard::default(),
-    };
-    Ok((found, heard))
+    let heard = listen(&mut line, &found, &config.arm)?;
+    if !fix || !needs_restart(&found, &heard) {
+        return Ok((found, heard, false));
+    }
+    // Its motors are off from then on, and no robot is up.
+    found.runs = Runs::Application(lager_loader::restart(&mut line, found.role)?);
+    let heard = listen(&mut line, &found, &config.arm)?;
+    Ok((found, heard, true))
 }
 
-fn listen(line: &mut BoardLine, role: Callsign, arm: &ArmProfile) -> Result<Heard, UpdateError> {
+/// Whether a board answers but does not do its work, which a restart may mend.
+fn needs_restart(found: &Found, heard: &Heard) -> bool {
+    match found.runs {
+        Runs::Loader(image) => image.is_some(),
+        Runs::Application(up) if up.version == Version::Original => false,
+        Runs::Application(_) if heard.status.is_none() => true,
+        Runs::Application(_) => match found.role {
+            Callsign::Steering => heard.steer.is_none() || !heard.knows_arm,
+            _ => heard.bits.is_none(),
+        },
+    }
+}
+
+/// What to do with a board that needs a restart.
+fn restarts(who: Callsign) -> String {
+    format!("`lager doctor --fix` or `lager board reset {who}` restarts it")
+}
+
+fn listen(line: &mut BoardLine, found: &Found, arm: &ArmProfile) -> Result<Heard, UpdateError> {
+    match found.runs {
+        Runs::Application(up) if up.version == Version::One => {}
+        Runs::Application(_) | Runs::Loader(_) => return Ok(Heard::default()),
+    }
     let raw_line = |value| Setting {
         key: SettingKey::RawLine,
         seq: 0,
         value,
     };
-    let told: Vec<Setting> = match role {
+    let told: Vec<Setting> = match found.role {
         Callsign::Sensor => vec![raw_line(1)],
         _ => arm.settings().collect(),
     };
     let mut heard = Heard::default();
     lager_loader::listen(line, LISTENS, &told, |payload| heard.take(payload))?;
-    if role == Callsign::Sensor {
+    if found.role == Callsign::Sensor {
         // The bridge asks for them by itself, if somebody wants them.
         lager_loader::listen(line, LISTENS / 10, &[raw_line(0)], |payload| {
             heard.take(payload);
@@ -195,7 +219,8 @@ fn judged(found: &Found, heard: &Heard, port: &Path, arm: &ArmProfile) -> Findin
         }
         Runs::Loader(Some(build)) => {
             return Hint(format!(
-                "it waits in its bootloader with build {build}; `lager board reset {who}` starts that (it is at {port})"
+                "it waits in its bootloader with build {build}; {} (it is at {port})",
+                restarts(who)
             ));
         }
         Runs::Application(up) if up.version == Version::Original => {
@@ -215,7 +240,8 @@ fn judged(found: &Found, heard: &Heard, port: &Path, arm: &ArmProfile) -> Findin
     }
     let Some((first, last)) = heard.status else {
         faults.push(format!(
-            "it answers, but sends nothing; `lager board reset {who}` restarts it"
+            "it answers, but sends nothing; {}",
+            restarts(who)
         ));
         return Bad(format!("{is}; {}", faults.join("; ")));
     };
@@ -243,9 +269,10 @@ fn restarted(why: ResetCause) -> Option<String> {
 
 fn sensor(heard: &Heard, faults: &mut Vec<String>) -> String {
     let Some(bits) = heard.bits else {
-        faults.push(
-            "no reading of the line sensors came; `lager board reset sensor` restarts it".into(),
-        );
+        faults.push(format!(
+            "no reading of the line sensors came; {}",
+            restarts(Callsign::Sensor)
+        ));
         return "the line is not known".into();
     };
     let line: String = (0..LineBits::SENSORS)
@@ -269,7 +296,10 @@ fn steering(
     faults: &mut Vec<String>,
 ) -> String {
     let Some(data) = heard.steer else {
-        faults.push("no report came; `lager board reset steering` restarts it".into());
+        faults.push(format!(
+            "no report came; {}",
+            restarts(Callsign::Steering)
+        ));
         return "its state is not known".into();
     };
     if !data.flags.contains(SteerFlags::EXDE_OK) {
@@ -282,9 +312,10 @@ fn steering(
         );
     }
     if !heard.knows_arm {
-        faults.push(
-            "it has not taken [arm], so nobody knows its servos; `lager board reset steering` restarts it".into(),
-        );
+        faults.push(format!(
+            "it has not taken [arm], so nobody knows its servos; {}",
+            restarts(Callsign::Steering)
+        ));
     }
     let servos: Vec<(usize, String)> = (0..usize::from(ArmData::SERVOS))
         .filter_map(|index| {

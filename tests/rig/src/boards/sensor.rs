@@ -3,12 +3,14 @@
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
     BoardStatus, Callsign, Centimetres, LineBits, LineReading, LineState, Packet, Payload, Profile,
-    ResetCause, SensorProfile, SettingKey, SettingReply, SettingStatus,
+    ResetCause, ResetOrder, SensorProfile, SettingKey, SettingReply, SettingStatus,
 };
 
 use super::Peer;
 use crate::GAP_US;
 use crate::board::answer_to;
+
+const RESTART: Payload = Payload::Reset(ResetOrder::Restart);
 
 /// A sensor board. Every 10 ms it sends a packet, in turn the line and the distance.
 pub struct SensorBoard {
@@ -28,7 +30,7 @@ pub struct SensorBoard {
     pub restarts: usize,
     /// How many times the link came up.
     pub ups: usize,
-    /// It does not answer settings.
+    /// It does not answer settings, until it restarts.
     pub deaf: bool,
     due_us: u32,
     flip_flop: bool,
@@ -65,6 +67,7 @@ impl SensorBoard {
         self.link = BoardLink::new(Callsign::Sensor, cause, GAP_US);
         self.reset = cause;
         self.raw = false;
+        self.deaf = false;
         self.restarts += 1;
     }
 
@@ -129,6 +132,9 @@ impl Peer for SensorBoard {
                     load_percent: 42,
                     longest_loop_100us: 50,
                 }));
+            }
+            Some(BoardEvent::Packet(packet)) if packet.payload == RESTART => {
+                self.restart(ResetCause::Ordered);
             }
             Some(BoardEvent::Packet(packet)) => self.set(&packet),
             None => (),
