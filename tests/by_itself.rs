@@ -1,13 +1,18 @@
 //! Tests that the robot never starts to move again by itself, and that no order moves it unseen:
-//! with frozen processes, late requests, and a cable that is cut towards the bridge.
+//! with frozen processes, late requests, a cable that is cut towards the bridge, and a calendar that
+//! jumps.
 
+use std::fs::{self, File};
+use std::os::unix::fs::FileExt as _;
+use std::path::PathBuf;
+use std::process::Command;
 use std::time::Duration;
 
 use lager_home::Clock;
 use lager_orders::Mode;
 use lager_ports::Subscriber;
-use lager_rig::behind_ports;
-use lager_tests::{Cable, Domain, Running, is_stopped, pid, wait_for};
+use lager_rig::{Watch, behind_ports};
+use lager_tests::{Cable, Domain, Running, in_tree, is_stopped, pid, wait_for};
 use lager_topics::{
     Health, Hold, LinkHealth, NavStatus, Origin, Phase, Refusal, SteeringState, TruthPose,
 };
@@ -92,7 +97,11 @@ fn freeze(process: u32) {
 
 /// A simulated robot in manual mode, driven forward by hand.
 fn driven_by_hand(domain: &Domain) -> (Running, DriveObserver, Running) {
-    let up = domain.start(&["up"]);
+    by_hand(domain, domain.start(&["up"]))
+}
+
+/// The same with a robot that was started.
+fn by_hand(domain: &Domain, up: Running) -> (Running, DriveObserver, Running) {
     let mut watch = DriveObserver::new(domain);
     watch.wait_for_health("the steering board", |health| health.steering.up != 0);
     insist(domain, &["mode", "manual"]);
@@ -279,5 +288,126 @@ fn a_mission_stands_while_the_steering_board_is_not_heard_and_is_delivered_after
     let told = up.json();
     assert_eq!(told["delivered"], serde_json::json!([1]), "{}", up.log());
     drop((body, plugged, watch, status, bus));
+    domain.assert_clean();
+}
+
+/// The calendar of programs that load a library, which moves it.
+struct Calendar {
+    library: PathBuf,
+    moved: PathBuf,
+}
+
+impl Calendar {
+    fn new(domain: &Domain) -> Self {
+        let at = |name: &str| domain.folder().join(name);
+        let (library, moved) = (at("calendar.so"), at("moved"));
+        fs::write(&moved, 0_i64.to_ne_bytes()).expect("a file");
+        let mut compiler = Command::new("cc");
+        compiler
+            .args(["-O1", "-shared", "-fPIC", "-o"])
+            .arg(&library);
+        let built = compiler.arg(in_tree("tests/data/calendar.c")).status();
+        assert!(built.is_ok_and(|status| status.success()), "cc builds it");
+        Self { library, moved }
+    }
+
+    /// `lager` with this calendar.
+    fn lager(&self, domain: &Domain, args: &[&str]) -> Command {
+        let mut command = domain.lager(args);
+        command.env("LD_PRELOAD", &self.library);
+        command.env("LAGER_CALENDAR", &self.moved);
+        command
+    }
+
+    /// From now on it is so many days ahead, or behind. Nobody reads half of a number.
+    fn jumps_to(&self, days: i64) {
+        let file = File::options().write(true).open(&self.moved);
+        let seconds = days * 24 * 3_600;
+        let written = file.and_then(|file| file.write_all_at(&seconds.to_ne_bytes(), 0));
+        written.expect("its file");
+    }
+
+    /// The date as `lager` sees it.
+    fn date(&self, domain: &Domain) -> String {
+        let output = self.lager(domain, &["doctor"]).output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        let line = said.lines().find(|line| line.contains("calendar"));
+        let date = line.and_then(|line| line.split("it says ").nth(1));
+        date.unwrap_or_else(|| panic!("no date in {said}"))[..10].to_owned()
+    }
+}
+
+/// A service that gives no sign of life for this time is replaced.
+const REPLACED_AFTER: Duration = Duration::from_secs(2);
+
+/// Ahead, and behind where it began. A Pi without a clock chip gets its date when it finds a network.
+const JUMPS: [i64; 3] = [20, -20, 0];
+
+#[test]
+fn a_calendar_that_jumps_ends_no_drive_and_keeps_none_alive() {
+    let domain = Domain::new();
+    let calendar = Calendar::new(&domain);
+    let command = calendar.lager(&domain, &["up"]);
+    let (up, mut watch, mut drive) = by_hand(&domain, domain.launch(command));
+    let held_up = Watch::begin();
+    let services = ["bridge", "logic"].map(|name| up.service(name));
+    let mut dates = Vec::new();
+    for days in JUMPS {
+        calendar.jumps_to(days);
+        dates.push(calendar.date(&domain));
+        // Who drives still does; who froze does not.
+        if !drive.is_running() {
+            let why = drive.log();
+            assert!(why.contains("held up"), "{why}");
+            drive = driving(&domain, &mut watch, &["drive", "forward"]);
+        }
+        freeze(drive.pid());
+        watch.wait_to_stand();
+        watch.assert_stands();
+        drive.signal(Signal::KILL);
+        drive.wait();
+        drive = driving(&domain, &mut watch, &["drive", "backward"]);
+    }
+    dates.dedup();
+    assert_eq!(dates.len(), JUMPS.len(), "{dates:?}");
+    let after = ["bridge", "logic"].map(|name| up.service(name));
+    assert!(
+        after == services || held_up.end() > REPLACED_AFTER,
+        "{}",
+        up.log()
+    );
+    drop((up, watch, drive));
+    domain.assert_clean();
+}
+
+#[test]
+fn a_mission_is_delivered_while_the_calendar_jumps() {
+    let domain = Domain::new();
+    let calendar = Calendar::new(&domain);
+    let mission = [
+        "up",
+        "--script",
+        "--mission",
+        "1",
+        "--exit-when-done",
+        "--json",
+    ];
+    let held_up = Watch::begin();
+    let mut up = domain.launch(calendar.lager(&domain, &mission));
+    let mut watch = DriveObserver::new(&domain);
+    for days in JUMPS {
+        wait_for("the wheels to turn", || {
+            watch.moves().filter(|moves| *moves)
+        });
+        calendar.jumps_to(days);
+        // Long enough for a service to be taken for dead.
+        std::thread::sleep(REPLACED_AFTER + Duration::from_secs(1));
+    }
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let told = up.json();
+    assert_eq!(told["delivered"], serde_json::json!([1]), "{}", up.log());
+    let is_whole = told["restarts"] == 0 || held_up.end() > REPLACED_AFTER;
+    assert!(is_whole, "{told}\n{}", up.log());
+    drop((up, watch));
     domain.assert_clean();
 }

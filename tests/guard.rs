@@ -148,11 +148,15 @@ fn freeze_the_logics(guard: u32) {
     };
     while logics(guard).iter().any(|logic| found.contains(logic)) {
         // A chain whose turn comes is told to run, so it is told again and again.
-        logics(guard).iter().for_each(|logic| signal(*logic, Signal::STOP));
+        logics(guard)
+            .iter()
+            .for_each(|logic| signal(*logic, Signal::STOP));
         sleep();
     }
     // Those of the next measurement.
-    logics(guard).iter().for_each(|logic| signal(*logic, Signal::CONT));
+    logics(guard)
+        .iter()
+        .for_each(|logic| signal(*logic, Signal::CONT));
 }
 
 const PATH_ONCE: [&str; 6] = ["--only", "path", "--runs", "1", "--attempts", "2"];

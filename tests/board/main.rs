@@ -1,6 +1,7 @@
 //! `lager board` and `lager doctor` with the boards' real images and bootloaders in emulated chips,
 //! behind two ptys.
 
+mod doctor;
 mod flash;
 
 use std::fs;
@@ -9,7 +10,6 @@ use std::process::{Child, Command, Output, Stdio};
 
 use lager_loader::{Header, Image, crc_step};
 use lager_pty::Port;
-use lager_rig::boards::{Plugged, SensorBoard};
 use lager_tests::{Domain, Running, in_tree, wait_for};
 use lager_topics::{Health, LinkHealth, StopCause};
 use lager_wire::{BUILD, ResetCause};
@@ -221,34 +221,6 @@ fn both_boards_get_their_images_and_an_update_that_broke_off_is_taken_up_again()
     assert_says(&said, &[&runs("steering", waits)]);
     assert!(!said.contains("sensor board: writes"), "{said}");
     drop(boards);
-    domain.assert_clean();
-}
-
-/// The sensor board is played here, so that it can be stuck.
-#[test]
-fn the_doctor_restarts_a_board_that_answers_and_does_not_work_only_if_it_may() {
-    let domain = Domain::among_others();
-    let (port, config) = (domain.folder().join("ttyUSB0"), domain.folder().join("lager.toml"));
-    let board = Plugged::new(SensorBoard::new(), port.clone(), 1.0);
-    let nobody = domain.folder().join("ttyUSB1");
-    let serial = format!("[serial]\nsensor = {port:?}\nsteering = {nobody:?}\n");
-    fs::write(&config, format!("body = \"serial\"\n{serial}")).expect("a file");
-    let doctor = |fix: &[&str]| {
-        let output = domain.run(&[&["--config", text(&config), "doctor"], fix].concat());
-        String::from_utf8_lossy(&output.stdout).into_owned()
-    };
-    let well = ["ok    sensor board", "tape under ....###...."];
-    assert_says(&doctor(&[]), &well);
-    board.with(|board| board.deaf = true);
-    let advice = "`lager doctor --fix` or `lager board reset sensor` restarts it";
-    assert_says(&doctor(&[]), &["no reading of the line sensors came", advice]);
-    assert_eq!(board.with(|board| board.restarts), 0, "it only looked");
-    let fixed = doctor(&["--fix"]);
-    assert_says(&fixed, &well);
-    assert_says(&fixed, &["it was restarted; build"]);
-    assert_eq!(board.with(|board| board.restarts), 1);
-    assert!(!doctor(&["--fix"]).contains("it was restarted"), "it works");
-    drop(board);
     domain.assert_clean();
 }
 

@@ -223,7 +223,7 @@ impl Robot {
             let (last, mut new) = (&mut self.last, None);
             self.steering.hear(&buffer[..count], |payload| {
                 new = note(last, payload).or(new);
-            });
+            })?;
             if let Some(code) = new {
                 return Ok(if (code == FOLLOW) == follows {
                     Reaction::Overtaken(end - start)

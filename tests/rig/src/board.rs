@@ -44,22 +44,12 @@ impl Board {
         })
     }
 
-    /// Reads what came, hands over each packet's data, accepts each setting, and sends a handshake if
-    /// one is due.
+    /// [`Board::take`], and sends a handshake if one is due.
     ///
     /// # Errors
     /// As [`Cable::read`] and [`Cable::write`].
-    pub fn answer(&mut self, mut packet: impl FnMut(Payload)) -> Result<(), Refused> {
-        let mut settings = Vec::new();
-        self.take(|payload| {
-            if let Payload::Setting(setting) = payload {
-                settings.push(setting);
-            }
-            packet(payload);
-        })?;
-        for setting in settings {
-            self.send(answer_to(&setting, SettingStatus::Accepted))?;
-        }
+    pub fn answer(&mut self, packet: impl FnMut(Payload)) -> Result<(), Refused> {
+        self.take(packet)?;
         match self.link.poll(board_us()) {
             Some(syn) => self.cable.write(&syn),
             None => Ok(()),
@@ -92,10 +82,10 @@ impl Board {
         }
     }
 
-    /// Reads the received bytes, and hands over each packet's data.
+    /// Reads the received bytes, and hears them.
     ///
     /// # Errors
-    /// As [`Cable::read`].
+    /// As [`Cable::read`] and [`Cable::write`].
     pub fn take(&mut self, mut packet: impl FnMut(Payload)) -> Result<(), Refused> {
         let mut buffer = [0; 256];
         loop {
@@ -103,17 +93,25 @@ impl Board {
             if count == 0 {
                 return Ok(());
             }
-            self.hear(&buffer[..count], &mut packet);
+            self.hear(&buffer[..count], &mut packet)?;
         }
     }
 
-    /// Decodes bytes that were read from the cable, and hands over each packet's data.
-    pub fn hear(&mut self, bytes: &[u8], mut packet: impl FnMut(Payload)) {
+    /// Decodes bytes that were read from the cable, hands over each packet's data, and accepts each
+    /// setting: a bridge that gets no answer lets nothing move.
+    ///
+    /// # Errors
+    /// As [`Cable::write`].
+    pub fn hear(&mut self, bytes: &[u8], mut packet: impl FnMut(Payload)) -> Result<(), Refused> {
         for byte in bytes {
             if let Some(BoardEvent::Packet(heard)) = self.link.push(*byte, board_us()) {
+                if let Payload::Setting(setting) = heard.payload {
+                    self.send(answer_to(&setting, SettingStatus::Accepted))?;
+                }
                 packet(heard.payload);
             }
         }
+        Ok(())
     }
 }
 

@@ -152,7 +152,11 @@ fn steps(args: &FlashArgs, loader: &Path, is_locked: bool) -> Vec<Step> {
     };
     let byte = |memory: &str, value: u8| format!("{memory}:w:{value:#04X}:m");
     vec![
-        step("low fuse", is_locked, &[byte("lfuse", args.clock.low_fuse())]),
+        step(
+            "low fuse",
+            is_locked,
+            &[byte("lfuse", args.clock.low_fuse())],
+        ),
         step("high fuse", false, &[byte("hfuse", fuses::HIGH)]),
         step("extended fuse", false, &[byte("efuse", fuses::EXTENDED)]),
         step(

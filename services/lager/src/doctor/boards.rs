@@ -239,10 +239,7 @@ fn judged(found: &Found, heard: &Heard, port: &Path, arm: &ArmProfile) -> Findin
         faults.push(why);
     }
     let Some((first, last)) = heard.status else {
-        faults.push(format!(
-            "it answers, but sends nothing; {}",
-            restarts(who)
-        ));
+        faults.push(format!("it answers, but sends nothing; {}", restarts(who)));
         return Bad(format!("{is}; {}", faults.join("; ")));
     };
     let told = match found.role {
@@ -296,10 +293,7 @@ fn steering(
     faults: &mut Vec<String>,
 ) -> String {
     let Some(data) = heard.steer else {
-        faults.push(format!(
-            "no report came; {}",
-            restarts(Callsign::Steering)
-        ));
+        faults.push(format!("no report came; {}", restarts(Callsign::Steering)));
         return "its state is not known".into();
     };
     if !data.flags.contains(SteerFlags::EXDE_OK) {

@@ -1,13 +1,15 @@
 //! The warehouse file: what cannot be is refused, and saving replaces the file whole.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::{PermissionsExt as _, symlink};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use lager_floor::Node;
 use lager_lines::Called;
 use lager_plant::{NamedProduct, Warehouse};
-use lager_station::files::Hold;
+use lager_station::files::{Hold, replace};
 use lager_station::{LoadError, SaveError, find, load, save, told};
 
 use crate::transcript::{WAREHOUSE, product, warehouse};
@@ -115,6 +117,81 @@ fn what_a_killed_one_left_is_in_nobody_s_way() {
     save(&folder.file(), &warehouse()).expect("saved");
     assert_eq!(load(&folder.file()).expect("a warehouse"), warehouse());
     assert_eq!(folder.names(), ["warehouse.toml"]);
+}
+
+/// The variable that tells [`it_saves`] where.
+const SAVES: &str = "LAGER_TEST_SAVES";
+const LATER: &str = "later = true\n";
+
+/// What a process does that is watched by the next test.
+#[test]
+#[ignore = "it is the other process of the next test"]
+fn it_saves() {
+    if let Some(path) = std::env::var_os(SAVES) {
+        replace(Path::new(&path), LATER).expect("it is replaced");
+    }
+}
+
+/// Every file that outlives a process is saved by the same function.
+#[test]
+fn a_save_that_is_killed_at_any_system_call_leaves_the_old_file_or_the_new_one() {
+    let folder = Folder::new("cut");
+    let log = folder.0.join("log");
+    // Saves under strace, with its options. Returns the file and whether the process was killed.
+    let saved = |options: &[&str]| {
+        fs::write(folder.file(), WAREHOUSE).expect("a file");
+        let mut strace = Command::new("strace");
+        strace
+            .args(["-f", "-y", "-qq", "-o"])
+            .arg(&log)
+            .args(options);
+        strace.arg(std::env::current_exe().expect("this program"));
+        strace.args(["file::it_saves", "--exact", "--ignored"]);
+        strace.env(SAVES, folder.file());
+        let ended = strace.output().expect("strace, which tests/run installs");
+        let text = fs::read_to_string(folder.file()).expect("a file");
+        (text, !ended.status.success())
+    };
+    let calls = "trace=openat,unlink,fchown,fchmod,write,fsync,rename";
+    assert_eq!(saved(&["-e", calls]), (LATER.to_owned(), false));
+    // The order is what makes it hold through a loss of power.
+    let said = fs::read_to_string(&log).expect("a log");
+    let (file, beside) = (folder.file(), folder.0.join("warehouse.toml.new"));
+    let (file, beside) = (file.display(), beside.display());
+    let steps = [
+        ("write(", format!("<{beside}>")),
+        ("fsync(", format!("<{beside}>")),
+        ("rename(", format!("\"{beside}\", \"{file}\"")),
+        ("fsync(", format!("<{}>", folder.0.display())),
+    ];
+    let mut lines = said.lines();
+    for (call, of) in &steps {
+        let is_it = |line: &str| line.contains(call) && line.contains(of);
+        assert!(
+            lines.any(is_it),
+            "{call} {of} is missing or comes too early: {said}"
+        );
+    }
+
+    let mut seen = BTreeSet::new();
+    for call in [
+        "openat", "unlink", "fchown", "fchmod", "write", "fsync", "rename",
+    ] {
+        for count in 1.. {
+            let kill = format!("inject={call}:signal=KILL:when={count}");
+            let (text, is_killed) = saved(&["-e", &format!("trace={call}"), "-e", &kill]);
+            assert!(text == WAREHOUSE || text == LATER, "{kill}: {text:?}");
+            if !is_killed {
+                assert_eq!(text, LATER);
+                break;
+            }
+            seen.insert((call, text == LATER));
+        }
+    }
+    // It was cut before the new text was there, and after that.
+    for cut in [("write", false), ("fsync", false), ("fsync", true)] {
+        assert!(seen.contains(&cut), "{cut:?} is not among {seen:?}");
+    }
 }
 
 #[test]

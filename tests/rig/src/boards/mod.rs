@@ -3,6 +3,7 @@
 //! original ones, written from the document alone. [`Plugged`] runs a board in a thread and can
 //! pull its cable.
 
+mod built;
 mod original;
 mod pty;
 mod register;
@@ -14,6 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+pub use built::Built;
 pub use original::{OriginalSensor, OriginalSteering};
 pub use pty::Pty;
 pub use register::Register;
