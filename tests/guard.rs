@@ -176,10 +176,10 @@ fn a_measurement_that_ended_because_the_machine_was_held_up_is_made_again() {
             signal(guard, Signal::CONT);
         });
     });
-    // What the second one measured beside other tests is not judged here.
-    assert!(matches!(said.code, Some(0 | 1)), "{}", said.everything);
-    let why = "gave a core to nobody here";
-    assert!(said.everything.contains(why), "{}", said.everything);
+    // The machine may really be held up in the second one, and what that measures is not judged here.
+    for words in ["path is measured again: ", "gave a core to nobody here"] {
+        assert!(said.everything.contains(words), "{}", said.everything);
+    }
 }
 
 #[test]
@@ -189,7 +189,9 @@ fn a_measurement_that_ended_on_a_machine_that_ran_is_not_made_again() {
     // If this machine was really held up, there is nothing to see.
     if !said.everything.contains("gave a core to nobody here") {
         assert_eq!(said.code, Some(2), "{}", said.everything);
-        let why = "the other process stands still";
-        assert!(said.everything.contains(why), "{}", said.everything);
+        let is_told = said
+            .everything
+            .contains("start again, and report it if it happens twice");
+        assert!(is_told, "{}", said.everything);
     }
 }

@@ -13,7 +13,8 @@ use crate::judge::judge;
 use crate::limits::Limits;
 
 /// Measures `scenario` until its limits are kept, at most `attempts` times. Returns the figures,
-/// and a note for each measurement that was not the last one.
+/// and a note for each measurement that broke a limit. Says at once if one is made again because
+/// the machine was held up.
 pub(crate) fn measure(
     limits: &Limits,
     scenario: Scenario,
@@ -25,7 +26,7 @@ pub(crate) fn measure(
     for left in (0..attempts).rev() {
         match once(limits, scenario, runs) {
             Err(GuardError::Scenario(_, error @ BenchError::HeldUp(..))) if left > 0 => {
-                notes.push(format!("{scenario}: measured again: {error}"));
+                eprintln!("benches/guard: {scenario} is measured again: {error}");
             }
             Err(error) => return Err(error),
             Ok(more) => {
