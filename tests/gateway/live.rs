@@ -28,7 +28,7 @@ payload! {
 
 /// A topic that the robot's table does not have.
 #[derive(Clone, Copy, Debug)]
-struct MuchNow;
+pub(crate) struct MuchNow;
 
 impl Topic for MuchNow {
     const NAME: &'static str = "much/now";
@@ -109,7 +109,7 @@ fn said(socket: &mut WebSocket<TcpStream>) -> Value {
     }
 }
 
-fn send(publisher: &Publisher<MuchNow>, number: u64) {
+pub(crate) fn send(publisher: &Publisher<MuchNow>, number: u64) {
     let words = [[u64::MAX - number; 32]; 4];
     let much = Much { number, words };
     publisher.send(Cause::OWN, much).expect("a sample");

@@ -1,6 +1,10 @@
 //! Tests of `lager gateway`: what it shows of a running robot to programs outside the bus.
 
 mod live;
+#[cfg(feature = "zenoh")]
+mod remote;
+#[cfg(feature = "zenoh")]
+mod zenoh;
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -52,6 +56,13 @@ fn until(address: &str, figure: &str, is_it: impl Fn(f64) -> bool) -> f64 {
 
 const LINES: &str = "lager_topic_samples_total{robot=\"r1\",topic=\"sensor/line\"}";
 const ORDERED: &str = "lager_stop_latched{robot=\"r1\",cause=\"ordered\"}";
+
+#[test]
+#[cfg(not(feature = "zenoh"))]
+#[ignore = "needs --features lager/zenoh"]
+fn listeners_with_zenoh() {
+    unreachable!("this program was built without them");
+}
 
 #[test]
 fn figures_tell_what_the_robot_does_and_outlive_a_killed_gateway() {

@@ -84,11 +84,17 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-home",
             "lager-orders",
             "lager-ports",
+            "lager-remote",
             "lager-sample",
             "lager-stop",
             "lager-topics",
             "lager-wake",
         ],
+    ),
+    // Both ends of what leaves the robot. It counts by stamps as the bus does, and opens none.
+    (
+        "lager-remote",
+        &["lager-home", "lager-ports", "lager-sample"],
     ),
     (
         "lager-gateway",
@@ -98,6 +104,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-journal",
             "lager-orders",
             "lager-ports",
+            "lager-remote",
             "lager-sample",
             "lager-stop",
             "lager-topics",
@@ -258,6 +265,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-plant",
             "lager-ports",
             "lager-recorder",
+            "lager-remote",
             "lager-sample",
             "lager-simulator",
             "lager-supervisor",

@@ -3,6 +3,7 @@
 
 mod floors;
 mod imports;
+mod licences;
 mod requirements;
 mod traps;
 
@@ -272,6 +273,7 @@ const DOCUMENTS: &[&str] = &[
     "services/lager/README.md",
     "services/lager/RASPBERRY-PI.md",
     "services/recorder/README.md",
+    "services/remote/README.md",
     "services/station/README.md",
     "firmware/README.md",
     "firmware/WIRING.md",

@@ -49,10 +49,11 @@ impl Found {
         Ok(self.receive_counted()?.map(|(sample, _)| sample))
     }
 
-    /// The next sample, and how many samples were missed before it.
-    pub(crate) fn receive_counted(
-        &mut self,
-    ) -> Result<Option<(FoundSample<'_>, u64)>, ReceiveError> {
+    /// The next sample, and how many samples were missed before it so far.
+    ///
+    /// # Errors
+    /// The transport failed.
+    pub fn receive_counted(&mut self) -> Result<Option<(FoundSample<'_>, u64)>, ReceiveError> {
         let description = &self.description;
         let taken = self.reader.receive()?;
         let lost = self.reader.streams().lost();

@@ -83,6 +83,7 @@ pub use kept::{KEPT_WAIT, KeptError};
 pub use publisher::{Loan, Publisher};
 pub use request::{Client, Server};
 pub use source::{Look, Source};
+pub use streams::Streams;
 pub use subscriber::{Sample, Subscriber};
 
 /// The software that carries the bus. All processes on one bus must have the same version of it.

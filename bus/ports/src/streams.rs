@@ -39,7 +39,7 @@ struct Stream {
 }
 
 /// Counters over all streams of one topic.
-pub(crate) struct Streams {
+pub struct Streams {
     /// The stream heard last comes first. Never grows beyond its first capacity.
     known: Vec<Stream>,
     attached_ns: u64,
@@ -49,7 +49,7 @@ pub(crate) struct Streams {
 
 impl Streams {
     /// For a reader that was attached at `attached_ns`.
-    pub(crate) fn new(attached_ns: u64) -> Self {
+    pub fn new(attached_ns: u64) -> Self {
         Self {
             known: Vec::with_capacity(REMEMBERED),
             attached_ns,
@@ -59,7 +59,7 @@ impl Streams {
     }
 
     /// Counts a received sample. Reads `clock` only if the stamp does not have the next number.
-    pub(crate) fn note(&mut self, stamp: &Stamp, clock: impl Fn() -> u64) {
+    pub fn note(&mut self, stamp: &Stamp, clock: impl Fn() -> u64) {
         self.received += 1;
         let found = self
             .known
@@ -112,7 +112,7 @@ impl Streams {
     }
 
     /// Samples missed.
-    pub(crate) fn lost(&self) -> u64 {
+    pub fn lost(&self) -> u64 {
         self.lost
     }
 

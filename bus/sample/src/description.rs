@@ -277,6 +277,13 @@ pub struct Described<'a> {
     bytes: &'a [u8],
 }
 
+impl<'a> Described<'a> {
+    /// The bytes as they lie in memory.
+    pub fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 enum Shown<'a> {
     Record(&'a Record),

@@ -36,7 +36,7 @@ extern crate self as lager_sample;
 
 pub use description::{Described, Description, DescriptionError, NoField, describe};
 pub use part::Part;
-pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo, bytes_of};
+pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo, bytes_of, from_bytes};
 pub use stamp::Stamp;
 pub use tag::{Coded, Tag};
 pub use topic::{Application, LARGEST_COPY, Qos, Request, Topic, TopicEntry, id};

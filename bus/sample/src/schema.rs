@@ -75,6 +75,14 @@ pub fn bytes_of<T: Field>(value: &T) -> &[u8] {
     unsafe { core::slice::from_raw_parts(core::ptr::from_ref(value).cast(), size_of::<T>()) }
 }
 
+/// The value of which these are the bytes, as [`bytes_of`] gives them; `None` if they are too many or
+/// too few.
+#[allow(unsafe_code, reason = "any bits are a valid `Field`")]
+pub fn from_bytes<T: Field>(bytes: &[u8]) -> Option<T> {
+    // SAFETY: as many bytes as the value has, which need not be aligned; any bits are a valid value.
+    (bytes.len() == size_of::<T>()).then(|| unsafe { bytes.as_ptr().cast::<T>().read_unaligned() })
+}
+
 /// One field of a payload, for tools that describe a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldInfo {
@@ -363,6 +371,19 @@ mod tests {
                 },
             ]
         );
+    }
+
+    #[test]
+    fn a_value_comes_back_from_its_bytes_wherever_they_lie() {
+        let probe = before::Probe {
+            count: 7,
+            ..before::Probe::default()
+        };
+        let mut shifted = vec![0];
+        shifted.extend(bytes_of(&probe));
+        assert_eq!(from_bytes(&shifted[1..]), Some(probe));
+        assert_eq!(from_bytes::<before::Probe>(&shifted), None);
+        assert_eq!(from_bytes::<before::Probe>(&shifted[2..]), None);
     }
 
     #[test]

@@ -1,9 +1,11 @@
-//! The bus to the outside: figures for Prometheus, and live views for Foxglove.
+//! The bus to the outside: figures for Prometheus, live views for Foxglove, and the samples
+//! themselves for listeners on other computers, over Zenoh.
 //!
 //! ```text
 //!         1 to 50 ms                            on request
 //!   bus ───────────> listener ──> Figures <──────────────── /metrics: Prometheus
-//!                       └───────> Live ───── as they come ─────────> Foxglove
+//!                       ├───────> Live ───── as they come ─────────> Foxglove
+//!                       └───────> Carrier ── as they come ─────────> Zenoh
 //! ```
 //!
 //! - `listener`: polls every topic, also those that are opened later. It is an observer: nobody
@@ -13,6 +15,7 @@
 //! - `http`: the server, in a thread of its own.
 //! - `live`: every sample as JSON, and pictures of the robot, for viewers; only with the feature
 //!   `foxglove`.
+//! - `carried`: every sample as it is, to `lager_remote::Carrier`; only with the feature `zenoh`.
 //! - `processes`: processor time and memory of each process of the robot.
 //!
 //! It never writes to the bus, and nobody waits for it. A request gets the figures of the last
@@ -20,6 +23,8 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "zenoh")]
+mod carried;
 mod exposition;
 mod figures;
 mod http;
@@ -33,13 +38,17 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use lager_home::UnitName;
 use lager_ports::{Bus, IntrospectError, ReceiveError};
+use lager_remote::Settings;
 use lager_stop::StopPage;
 use lager_wake::{Shutdown, Watchdog};
 use tokio::runtime::Runtime;
 
 use figures::Figures;
-use listener::Viewer;
+use listener::{Outlet, Shown, Viewer};
+
+pub use lager_remote::USUAL_ZENOH;
 
 /// Where Prometheus finds the figures by default.
 pub const USUAL_METRICS: &str = "127.0.0.1:7430";
@@ -49,6 +58,9 @@ pub const USUAL_FOXGLOVE: &str = "127.0.0.1:8765";
 
 /// Whether this program was built with the server for Foxglove.
 pub const HAS_FOXGLOVE: bool = cfg!(feature = "foxglove");
+
+/// Whether this program was built with what speaks Zenoh.
+pub const HAS_ZENOH: bool = cfg!(feature = "zenoh");
 
 /// The dashboard for Grafana, to import there. Every query in it uses figures that exist.
 pub const DASHBOARD: &str = include_str!("../grafana.json");
@@ -75,6 +87,16 @@ pub enum GatewayError {
          `cargo build --release --features foxglove`"
     )]
     NoFoxglove,
+    /// The program cannot speak Zenoh.
+    #[error(
+        "this program was built without what speaks Zenoh; build one that has it with `cargo build \
+         --release --features zenoh`"
+    )]
+    NoZenoh,
+    /// It cannot listen where listeners are to find it.
+    #[cfg(feature = "zenoh")]
+    #[error(transparent)]
+    Carrier(#[from] lager_remote::CarrierError),
     /// The system does not let it run.
     #[error("the gateway cannot run: {0}")]
     Run(#[from] io::Error),
@@ -101,22 +123,27 @@ impl GatewayError {
 
 /// Where programs outside find the robot. Everybody who can reach an address may look, and can do
 /// nothing else.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Addresses {
     /// The figures for Prometheus.
     pub metrics: Option<SocketAddr>,
     /// The live views for Foxglove.
     pub foxglove: Option<SocketAddr>,
+    /// The samples for listeners on other computers.
+    pub zenoh: Option<Settings>,
 }
 
 impl Addresses {
     /// Refuses addresses that a gateway could not use at this moment.
     ///
     /// # Errors
-    /// An address is taken, or this program cannot speak to Foxglove.
-    pub fn may_be_had(&self) -> Result<(), GatewayError> {
+    /// An address is taken, or this program cannot speak to Foxglove or Zenoh.
+    pub fn may_be_had(&self, robot: &UnitName) -> Result<(), GatewayError> {
         if self.foxglove.is_some() && !HAS_FOXGLOVE {
             return Err(GatewayError::NoFoxglove);
+        }
+        if self.zenoh.is_some() && !HAS_ZENOH {
+            return Err(GatewayError::NoZenoh);
         }
         let wanted = [("--metrics", self.metrics), ("--foxglove", self.foxglove)];
         // Held together, as one address cannot be both.
@@ -126,6 +153,12 @@ impl Addresses {
                 held.push(bind(flag, address)?);
             }
         }
+        #[cfg(feature = "zenoh")]
+        if let Some(settings) = &self.zenoh {
+            lager_remote::may_be_had(settings, robot)?;
+        }
+        #[cfg(not(feature = "zenoh"))]
+        let _ = robot;
         Ok(())
     }
 }
@@ -139,15 +172,15 @@ pub struct Gateway {
     runtime: Runtime,
     at: Addresses,
     metrics: Option<TcpListener>,
-    viewer: Option<Box<dyn Viewer>>,
+    shown: Shown,
 }
 
 impl Gateway {
     /// Listens at the addresses that are `wanted`, for whoever wants to look at `robot`.
     ///
     /// # Errors
-    /// An address is not free, or this program cannot speak to Foxglove.
-    pub fn open(wanted: Addresses, robot: &str) -> Result<Self, GatewayError> {
+    /// An address is not free, or this program cannot speak to Foxglove or Zenoh.
+    pub fn open(wanted: Addresses, robot: &UnitName) -> Result<Self, GatewayError> {
         let mut runtime = tokio::runtime::Builder::new_current_thread();
         let runtime = runtime.enable_all().build()?;
         let mut at = Addresses::default();
@@ -158,23 +191,27 @@ impl Gateway {
             at.metrics = Some(listener.local_addr()?);
             metrics = Some(listener);
         }
-        let mut viewer = None;
+        let mut shown = Shown::default();
         if let Some(address) = wanted.foxglove {
-            let (live, address) = open_live(address, robot, &runtime)?;
+            let (live, address) = open_live(address, robot.as_str(), &runtime)?;
             at.foxglove = Some(address);
-            viewer = Some(live);
+            shown.viewer = Some(live);
+        }
+        if let Some(settings) = wanted.zenoh {
+            shown.outlet = Some(open_outlet(&settings, robot)?);
+            at.zenoh = Some(settings);
         }
         Ok(Self {
             runtime,
             at,
             metrics,
-            viewer,
+            shown,
         })
     }
 
     /// Where it answers.
-    pub fn addresses(&self) -> Addresses {
-        self.at
+    pub fn addresses(&self) -> &Addresses {
+        &self.at
     }
 
     /// Reads the robot of `bus` and answers until `shutdown` is requested.
@@ -201,7 +238,7 @@ impl Gateway {
                     .spawn_scoped(scope, move || http::serve(runtime, metrics, shared, over))?
             };
             let is_over = || served.is_finished();
-            let listened = listener::listen(bus, watchdog, shutdown, &shared, self.viewer, is_over);
+            let listened = listener::listen(bus, watchdog, shutdown, &shared, self.shown, is_over);
             over.store(true, Ordering::Relaxed);
             let served = served.join().expect("the server does not panic");
             listened?;
@@ -228,6 +265,16 @@ fn open_live(
     _runtime: &Runtime,
 ) -> Result<(Box<dyn Viewer>, SocketAddr), GatewayError> {
     Err(GatewayError::NoFoxglove)
+}
+
+#[cfg(feature = "zenoh")]
+fn open_outlet(settings: &Settings, robot: &UnitName) -> Result<Box<dyn Outlet>, GatewayError> {
+    Ok(Box::new(lager_remote::Carrier::open(settings, robot)?))
+}
+
+#[cfg(not(feature = "zenoh"))]
+fn open_outlet(_settings: &Settings, _robot: &UnitName) -> Result<Box<dyn Outlet>, GatewayError> {
+    Err(GatewayError::NoZenoh)
 }
 
 /// What listener and server share.

@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use lager_home::{BusWatch, Clock};
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    Bus, Found, IntrospectError, Layout, Look, PortError, ReceiveError, Source, Subscriber,
+    Bus, Found, IntrospectError, Layout, PortError, ReceiveError, Source, Subscriber, TopicInfo,
 };
-use lager_sample::{Description, Stamp, Topic};
+use lager_remote::Kind;
+use lager_sample::{Description, Stamp, Topic, bytes_of};
 use lager_topics::{TOPICS, TopicVisitor, visit};
 use lager_wake::{Pace, Shutdown, Watchdog};
 use serde::Serialize;
@@ -34,25 +35,51 @@ pub(crate) trait Viewer {
     fn take(&mut self, topic: &str, stamp: &Stamp, message: &[u8]);
 }
 
+/// A part that gets every sample at once, as it lies in memory.
+pub(crate) trait Outlet {
+    /// The listener reads a topic from now on.
+    fn open(&mut self, topic: &str, description: &Description, kind: Kind);
+
+    /// Learns who writes and reads the topics.
+    fn look_at_ends(&mut self, topics: &[TopicInfo]);
+
+    /// Takes a sample. The bus has lost `lost` samples of the topic so far.
+    fn take(&mut self, topic: &str, stamp: &Stamp, lost: u64, payload: &[u8]);
+
+    /// Has its turn after each look at the bus.
+    fn tick(&mut self);
+}
+
+/// Those who get each sample, if there are any.
+#[derive(Default)]
+pub(crate) struct Shown {
+    /// Viewers of messages.
+    pub(crate) viewer: Option<Box<dyn Viewer>>,
+    /// Listeners on other computers.
+    pub(crate) outlet: Option<Box<dyn Outlet>>,
+}
+
 /// Reads every topic until a request to end, or until `is_over`.
 pub(crate) fn listen(
     bus: &Bus,
     watchdog: &Watchdog,
     shutdown: &Shutdown,
     shared: &Shared,
-    viewer: Option<Box<dyn Viewer>>,
+    shown: Shown,
     is_over: impl Fn() -> bool,
 ) -> Result<(), GatewayError> {
-    let mut pace = match viewer {
-        Some(_) => Pace::keeping(),
+    let Shown { viewer, outlet } = shown;
+    let mut pace = match viewer.is_some() || outlet.is_some() {
+        true => Pace::keeping(),
         // Its own figures are made from stamps.
-        None => Pace::counting(),
+        false => Pace::counting(),
     };
     let mut listener = Listener {
         bus,
         watchdog,
         clock: bus.clock(),
         viewer,
+        outlet,
         feeds: Vec::new(),
         opened: BTreeSet::new(),
         refused: BTreeSet::new(),
@@ -81,6 +108,9 @@ pub(crate) fn listen(
             }
         }
         listener.drain(shared, &mut pace)?;
+        if let Some(outlet) = &mut listener.outlet {
+            outlet.tick();
+        }
         std::thread::sleep(pace.wait());
     }
     Ok(())
@@ -92,6 +122,7 @@ struct Listener<'a> {
     watchdog: &'a Watchdog,
     clock: Clock,
     viewer: Option<Box<dyn Viewer>>,
+    outlet: Option<Box<dyn Outlet>>,
     feeds: Vec<Box<dyn Feed>>,
     opened: BTreeSet<String>,
     /// Topics that could not be opened and were reported.
@@ -102,8 +133,8 @@ struct Listener<'a> {
 
 /// A topic that is listened to.
 trait Feed {
-    /// How its messages are written, and whether it is a state.
-    fn schema(&self) -> (EnvelopeSchema, bool);
+    /// The layout of its samples, and what it carries.
+    fn about(&self) -> (Description, Kind);
 
     /// Takes the new samples. Returns how full the topic's queue was.
     fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError>;
@@ -114,12 +145,22 @@ struct Takers<'a> {
     figures: &'a mut Figures,
     real: &'a dyn Fn(Duration) -> Duration,
     viewer: Option<&'a mut (dyn Viewer + 'static)>,
+    outlet: Option<&'a mut (dyn Outlet + 'static)>,
 }
 
 impl Takers<'_> {
     /// Of any topic.
-    fn count<P: Serialize>(&mut self, topic: &str, stamp: &Stamp, lost: u64, payload: &P) {
+    fn count<P: Serialize>(
+        &mut self,
+        topic: &str,
+        stamp: &Stamp,
+        lost: u64,
+        (payload, bytes): (&P, &[u8]),
+    ) {
         self.figures.count(topic, stamp, lost);
+        if let Some(outlet) = &mut self.outlet {
+            outlet.take(topic, stamp, lost, bytes);
+        }
         let Some(viewer) = self.viewer.as_mut().filter(|viewer| viewer.wants(topic)) else {
             return;
         };
@@ -164,6 +205,9 @@ impl Listener<'_> {
             }
         }
         shared.figures().look_at_ends(&topics);
+        if let Some(outlet) = &mut self.outlet {
+            outlet.look_at_ends(&topics);
+        }
         Ok(())
     }
 
@@ -171,9 +215,13 @@ impl Listener<'_> {
         match opened {
             Ok(Some(feed)) => {
                 self.opened.insert(name.to_owned());
+                let (description, kind) = feed.about();
                 if let Some(viewer) = &mut self.viewer {
-                    let (schema, is_state) = feed.schema();
-                    viewer.open(name, &schema, is_state);
+                    let schema = EnvelopeSchema::of(&description);
+                    viewer.open(name, &schema, kind == Kind::State);
+                }
+                if let Some(outlet) = &mut self.outlet {
+                    outlet.open(name, &description, kind);
                 }
                 self.feeds.push(feed);
             }
@@ -194,6 +242,7 @@ impl Listener<'_> {
             figures: &mut figures,
             real: &|robot| self.clock.real(robot),
             viewer: self.viewer.as_deref_mut(),
+            outlet: self.outlet.as_deref_mut(),
         };
         let mut feeds = self.feeds.iter_mut();
         let drained = feeds.try_for_each(|feed| feed.drain(&mut to, pace));
@@ -215,9 +264,14 @@ impl TopicVisitor for Open<'_> {
 }
 
 impl<T: Topic> Feed for Subscriber<T> {
-    fn schema(&self) -> (EnvelopeSchema, bool) {
-        let schema = EnvelopeSchema::of(&Description::of::<T::Payload>());
-        (schema, T::QOS.history > 0)
+    fn about(&self) -> (Description, Kind) {
+        let entry = TOPICS.iter().find(|entry| entry.name == T::NAME);
+        let kind = match entry.and_then(|entry| entry.period_ms) {
+            _ if self.holds() => Kind::State,
+            Some(_) => Kind::Stream,
+            None => Kind::Event,
+        };
+        (Description::of::<T::Payload>(), kind)
     }
 
     fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError> {
@@ -228,7 +282,8 @@ impl<T: Topic> Feed for Subscriber<T> {
             };
             found += 1;
             let payload: &T::Payload = &sample;
-            to.count(T::NAME, sample.stamp(), self.lost(), payload);
+            let lost = Subscriber::lost(self);
+            to.count(T::NAME, sample.stamp(), lost, (payload, bytes_of(payload)));
             let real = to.real;
             to.figures.learn(sample.stamp(), payload as &dyn Any, real);
         }
@@ -238,31 +293,27 @@ impl<T: Topic> Feed for Subscriber<T> {
 }
 
 impl Feed for Found {
-    fn schema(&self) -> (EnvelopeSchema, bool) {
-        (EnvelopeSchema::of(self.description()), false)
+    fn about(&self) -> (Description, Kind) {
+        let kind = match self.holds() {
+            true => Kind::State,
+            // Its period is not known.
+            false => Kind::Stream,
+        };
+        (self.description().clone(), kind)
     }
 
     fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError> {
         let name = self.name().to_owned();
         let mut found = 0;
-        while found < TURN && self.next(Counting { name: &name, to })?.is_some() {
+        while found < TURN {
+            let Some((sample, lost)) = self.receive_counted()? else {
+                break;
+            };
             found += 1;
+            let payload = sample.payload();
+            to.count(&name, sample.stamp(), lost, (&payload, payload.bytes()));
         }
         pace.found(found, self.queue());
         Ok(())
-    }
-}
-
-/// Tells of a sample whatever its payload is.
-struct Counting<'a, 'b> {
-    name: &'a str,
-    to: &'a mut Takers<'b>,
-}
-
-impl Look for Counting<'_, '_> {
-    type Output = ();
-
-    fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, payload: &P) {
-        self.to.count(self.name, stamp, lost, payload);
     }
 }

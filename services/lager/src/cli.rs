@@ -5,6 +5,7 @@ mod board;
 mod commission;
 mod gateway;
 pub mod help;
+mod keys;
 mod ordered;
 mod realtime;
 mod report;
@@ -17,7 +18,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS};
+use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS, USUAL_ZENOH};
 use lager_lines::Called;
 use lager_supervisor::Parent;
 use lager_wire::{OperatorCommand, Speed};
@@ -26,6 +27,7 @@ pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 pub use board::{BoardArgs, BoardCommand, FlashArgs, PortArgs, ResetArgs, UpdateArgs};
 pub use commission::CommissionArgs;
 pub use gateway::GatewayArgs;
+pub use keys::{KeysArgs, KeysCommand};
 pub use ordered::{Button, MapChange, ObstacleChange, Ordered, Plain, QueueChange};
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
 pub use report::ReportArgs;
@@ -201,8 +203,10 @@ answers for the robot that has been connected for longest, and the station saves
 warehouse. Without --robots-secret the station believes every robot, so let only your robots reach
 --listen. The panel asks for a token; the station prints the addresses that contain it.")]
     Station(StationArgs),
-    /// Show the robot to other programs: figures to Prometheus, live views to Foxglove
+    /// Show the robot to other programs: to Prometheus, Foxglove, and listeners with Zenoh
     Gateway(GatewayArgs),
+    /// Make certificates for listeners on other computers
+    Keys(KeysArgs),
     /// Answer a station from this terminal (as a GaG): describe the warehouse, choose goods, drive
     #[command(after_help = "Examples:
   lager gag                                  at the station of the robot that is up, or of `lager station`
@@ -362,6 +366,10 @@ pub struct UpArgs {
     /// --help`
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, value_parser = values::listens, help_heading = "Outside")]
     pub foxglove: Option<std::net::SocketAddr>,
+    /// Give samples to listeners with Zenoh, at this endpoint [default: tcp/127.0.0.1:7447]; see
+    /// `lager gateway --help`
+    #[arg(long, value_name = "ENDPOINT", num_args = 0..=1, default_missing_value = USUAL_ZENOH, help_heading = "Outside")]
+    pub zenoh: Option<lager_remote::Endpoint>,
     /// Let a real robot drive --mission by itself; keep people out of its way. A simulated or
     /// emulated robot needs no --script
     #[arg(long, help_heading = "Mission")]

@@ -46,7 +46,7 @@ pub use bus::{BusSection, Waiting};
 pub use buttons::ButtonsSection;
 pub use chip::ChipSection;
 pub use documented::flag;
-pub use gateway::GatewaySection;
+pub use gateway::{GatewaySection, ZenohSection};
 pub use logic::LogicSection;
 pub use realtime::RealtimeSection;
 pub use serial::{BAUD_RATES, SerialSection};
@@ -236,6 +236,7 @@ impl Config {
         self.wheels.validate()?;
         self.distance.validate()?;
         self.arm.validate()?;
+        self.gateway.addresses().context("[gateway.zenoh]")?;
         Ok(())
     }
 

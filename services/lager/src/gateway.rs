@@ -18,22 +18,24 @@ use crate::time_limit::TimeLimit;
 /// up, it takes over that robot's clock, because the boards' silence counts in that time.
 ///
 /// # Errors
-/// The robot's folder cannot be read, or this program cannot speak to Foxglove.
+/// The robot's folder cannot be read, or this program cannot do what is wanted.
 pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, Addresses)> {
     let mut joined = config.clone();
     if let Some(running) = config.of_running_robot()? {
         joined.speed = running.speed;
         joined.chip.clock = running.chip.clock;
     }
-    let configured = joined.gateway.addresses();
+    let configured = &joined.gateway;
+    let zenoh = configured.zenoh.settings(args.zenoh.clone());
     let mut wanted = Addresses {
         metrics: args.metrics.or(configured.metrics),
         foxglove: args.foxglove.or(configured.foxglove),
+        zenoh: zenoh.map_err(|error| exit::Usage(error.to_string()))?,
     };
     if wanted == Addresses::default() {
         wanted.metrics = Some(USUAL_METRICS.parse().context("the usual address")?);
     }
-    wanted.may_be_had().map_err(refused)?;
+    wanted.may_be_had(&joined.name.parse()?).map_err(refused)?;
     Ok((joined, wanted))
 }
 
@@ -42,8 +44,9 @@ pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, Addresses
 /// # Errors
 /// An address is not free, or the bus cannot be read.
 pub fn run(bus: &Bus, config: &Config, wanted: Addresses, shutdown: &Shutdown) -> Result<()> {
-    let gateway = Gateway::open(wanted, bus.unit().as_str())?;
-    if config.gateway.addresses() != wanted {
+    let is_known = config.gateway.addresses()? == wanted;
+    let gateway = Gateway::open(wanted, bus.unit())?;
+    if !is_known {
         // Nobody else has said where it answers.
         for line in told(gateway.addresses()) {
             console::print(&line)?;
@@ -60,23 +63,23 @@ pub fn run(bus: &Bus, config: &Config, wanted: Addresses, shutdown: &Shutdown) -
 /// answer.
 ///
 /// # Errors
-/// An address is not free, or this program cannot speak to Foxglove.
+/// An address is not free, or this program cannot do what is wanted.
 pub fn promise(config: &Config) -> Result<Vec<String>> {
-    let wanted = config.gateway.addresses();
+    let wanted = config.gateway.addresses()?;
     // The gateway opens each of them again in a moment.
-    wanted.may_be_had().map_err(refused)?;
-    Ok(told(wanted))
+    wanted.may_be_had(&config.name.parse()?).map_err(refused)?;
+    Ok(told(&wanted))
 }
 
 /// Refuses what this program was not built for.
 fn refused(error: GatewayError) -> anyhow::Error {
     match error {
-        GatewayError::NoFoxglove => exit::Usage(error.to_string()).into(),
+        GatewayError::NoFoxglove | GatewayError::NoZenoh => exit::Usage(error.to_string()).into(),
         other => other.into(),
     }
 }
 
-fn told(at: Addresses) -> Vec<String> {
+fn told(at: &Addresses) -> Vec<String> {
     let metrics = at
         .metrics
         .map(|at| reach::listed(at, |at| format!("http://{at}/metrics")))
@@ -85,12 +88,36 @@ fn told(at: Addresses) -> Vec<String> {
         .foxglove
         .map(|at| reach::listed(at, |at| format!("ws://{at}")))
         .map(|at| format!("Foxglove opens a connection to {at}"));
-    metrics.into_iter().chain(foxglove).collect()
+    let zenoh = at.zenoh.as_ref().map(|settings| {
+        let endpoint = &settings.endpoint;
+        format!("listeners with Zenoh connect to {endpoint}")
+    });
+    metrics.into_iter().chain(foxglove).chain(zenoh).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_program_without_zenoh_says_how_to_build_one_that_has_it() {
+        let mut config = Config::default();
+        config.gateway.zenoh.endpoint = Some("unixsock-stream/zenoh".parse().expect("an endpoint"));
+        let promised = promise(&config);
+        if lager_gateway::HAS_ZENOH {
+            assert_eq!(
+                promised.expect("an endpoint").as_slice(),
+                ["listeners with Zenoh connect to unixsock-stream/zenoh"]
+            );
+        } else {
+            let refused = promised.expect_err("it cannot");
+            assert!(refused.is::<exit::Usage>());
+            assert!(
+                refused.to_string().contains("--features zenoh`"),
+                "{refused}"
+            );
+        }
+    }
 
     #[test]
     fn a_program_without_foxglove_says_how_to_build_one_that_has_it() {

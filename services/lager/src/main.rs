@@ -22,6 +22,7 @@ mod gag;
 mod gateway;
 mod goods;
 mod hint;
+mod keys;
 mod meant;
 mod overload;
 mod reach;
@@ -246,6 +247,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             )?;
             return Ok(ExitCode::SUCCESS);
         }
+        Command::Keys(args) => keys::run(&args)?,
         Command::Gag { socket } => {
             gag::run(&config, socket, &shutdown)?;
             return Ok(ExitCode::SUCCESS);

@@ -29,7 +29,7 @@ pub fn run(config: &Config, args: &TopArgs, patience: &TimeLimit) -> Result<()> 
     let bus = topic::join(config, Role::Monitor, &patience.watchdog)?;
     let out = &mut BufWriter::new(std::io::stdout());
     let mut tools = Tools {
-        bus: &bus,
+        place: &bus,
         watchdog: &patience.watchdog,
         shutdown: &patience.shutdown,
         as_json: args.json,

@@ -6,6 +6,9 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use anyhow::{Context, Result, anyhow};
 use lager_monitor::{EchoConfig, Payloads, PublishError, Publishing, ToolError, Tools};
 use lager_ports::Bus;
+use lager_remote::Endpoint;
+#[cfg(feature = "zenoh")]
+use lager_remote::Remote;
 use lager_topics::{Role, TOPICS, UnknownTopic};
 use lager_wake::Watchdog;
 use serde_json::Value;
@@ -26,6 +29,9 @@ pub fn run(
     every_robot: bool,
     patience: &TimeLimit,
 ) -> Result<()> {
+    if let Some(endpoint) = &args.remote {
+        return from_afar(config, endpoint, &args, patience);
+    }
     if let TopicCommand::Echo { watch, .. }
     | TopicCommand::Hz { watch }
     | TopicCommand::Bw { watch }
@@ -42,7 +48,7 @@ pub fn run(
     };
     let bus = join(config, role, &patience.watchdog)?;
     let mut tools = Tools {
-        bus: &bus,
+        place: &bus,
         watchdog: &patience.watchdog,
         shutdown: &patience.shutdown,
         as_json: args.json,
@@ -99,6 +105,59 @@ pub fn run(
     };
     let as_usage = |error| as_usage(error, &bus, &patience.watchdog);
     ended(shown.map_err(as_usage), tools.out)
+}
+
+/// The tools over a robot's gateway.
+#[cfg(feature = "zenoh")]
+fn from_afar(
+    config: &Config,
+    endpoint: &Endpoint,
+    args: &TopicArgs,
+    patience: &TimeLimit,
+) -> Result<()> {
+    let proof = config.gateway.zenoh.proof()?;
+    let robot = config.name.parse()?;
+    let remote = Remote::open(endpoint, &robot, proof.as_ref())?;
+    let mut tools = Tools {
+        place: &remote,
+        watchdog: &patience.watchdog,
+        shutdown: &patience.shutdown,
+        as_json: args.json,
+        out: &mut BufWriter::new(std::io::stdout().lock()),
+    };
+    let shown = match &args.command {
+        TopicCommand::List => tools.list_carried(),
+        TopicCommand::Echo { watch, field } => {
+            let echo = EchoConfig {
+                fields: field.clone(),
+                limits: watch.until.limits(),
+            };
+            tools.echo(&watch.topic, &echo)
+        }
+        TopicCommand::Hz { watch } => tools.hz(&watch.topic, watch.until.limits()),
+        TopicCommand::Bw { watch } => tools.bandwidth(&watch.topic, watch.until.limits()),
+        TopicCommand::Delay { watch } => tools.delay(&watch.topic, watch.until.limits()),
+        TopicCommand::Info { .. } | TopicCommand::Pub { .. } | TopicCommand::Schema { .. } => {
+            let what = "--remote is for list, echo, hz, bw and delay; use the others on the robot";
+            return Err(exit::Usage(what.to_owned()).into());
+        }
+    };
+    let shown = shown.map_err(|error| match error {
+        ToolError::NoField(error) => exit::Usage(error.to_string()).into(),
+        error => anyhow::Error::from(error),
+    });
+    ended(shown, tools.out)
+}
+
+/// The tools over a robot's gateway, which this program cannot call.
+#[cfg(not(feature = "zenoh"))]
+fn from_afar(
+    _config: &Config,
+    _endpoint: &Endpoint,
+    _args: &TopicArgs,
+    _patience: &TimeLimit,
+) -> Result<()> {
+    Err(exit::Usage(lager_gateway::GatewayError::NoZenoh.to_string()).into())
 }
 
 /// Joins the bus.

@@ -113,7 +113,10 @@ pub fn begin(speaker: Speaker, log: &LogSection) -> Result<()> {
             .with_filter(faults())
             .boxed(),
     };
-    Registry::default().with(terminal).with(in_file).init();
+    let registry = Registry::default().with(terminal).with(in_file);
+    #[cfg(feature = "zenoh")]
+    let registry = registry.with(lager_remote::causes());
+    registry.init();
     Ok(())
 }
 
@@ -123,11 +126,14 @@ pub fn are_shown(log: &LogSection) -> bool {
     log.file.is_none() && (log.json || asked)
 }
 
-/// Which events appear by default. A broken connection of a viewer is not a fault of the robot.
+/// Which events appear by default. A broken connection of a viewer or a listener is not a fault of
+/// the robot.
 fn faults() -> Targets {
     Targets::new()
         .with_default(LevelFilter::WARN)
         .with_target("foxglove", LevelFilter::OFF)
+        // And all its crates, whose names begin so.
+        .with_target("zenoh", LevelFilter::OFF)
 }
 
 /// A layer in a box, whatever it writes.

@@ -460,6 +460,9 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
     }
     config.gateway.metrics = args.metrics.or(config.gateway.metrics);
     config.gateway.foxglove = args.foxglove.or(config.gateway.foxglove);
+    if let Some(endpoint) = &args.zenoh {
+        config.gateway.zenoh.endpoint = Some(endpoint.clone());
+    }
     args.realtime.apply(&mut config.realtime);
     Ok(())
 }

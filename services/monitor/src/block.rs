@@ -19,8 +19,7 @@
 
 use std::fmt::Write;
 
-use lager_ports::Found;
-use lager_sample::{Schema, Stamp, Topic};
+use lager_sample::{Description, Schema, Stamp, Topic};
 use serde_json::Value;
 
 use crate::{ToolError, durations, sentence};
@@ -62,28 +61,30 @@ impl Blocks {
     }
 
     /// For a topic of which only the description is known.
-    pub(crate) fn of_found(found: &Found) -> Result<Self, ToolError> {
-        let description = found.description();
+    pub(crate) fn of_found(topic: &str, description: &Description) -> Result<Self, ToolError> {
         let zeros = vec![0; description.size()];
         Ok(Self {
             row: is_row(&serde_json::to_value(description.read(&zeros))?).then(Vec::new),
-            topic: found.name().to_owned(),
+            topic: topic.to_owned(),
             fields: description.fields().map(str::to_owned).collect(),
             blank: Value::Null,
             sentence: |_| None,
         })
     }
 
-    /// The text of one sample that was received at `received_ns`, with its line ends.
+    /// The text of one sample that was received at `received_ns`, with its line ends. Without that
+    /// time its age is unknown.
     pub(crate) fn sample(
         &mut self,
         stamp: &Stamp,
-        received_ns: u64,
+        received_ns: Option<u64>,
         writer: &str,
         payload: &Value,
     ) -> String {
         let at = scaled(stamp.publish_time_ns / 1_000, 6);
-        let age = scaled(received_ns.saturating_sub(stamp.source_time_ns) / 1_000, 3);
+        let age = received_ns.map_or(UNKNOWN.to_owned(), |received_ns| {
+            scaled(received_ns.saturating_sub(stamp.source_time_ns) / 1_000, 3)
+        });
         let payload = &durations::readable(payload);
         let mut text = String::new();
         // Writing to a String cannot fail.
@@ -422,7 +423,7 @@ mod tests {
         let sample = |fields: &Value| {
             let payload: T::Payload = serde_json::from_value(fields.clone()).expect("its fields");
             let payload = serde_json::to_value(payload).expect("a payload in JSON");
-            blocks.sample(&stamp, 5_123_458_500_000, "bridge (4711)", &payload)
+            blocks.sample(&stamp, Some(5_123_458_500_000), "bridge (4711)", &payload)
         };
         payloads.iter().map(sample).collect()
     }

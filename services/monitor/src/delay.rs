@@ -23,6 +23,7 @@ use lager_wake::Pace;
 use serde_json::{Value, json};
 
 use crate::measure::{Arrival, Gauge, Limits, Plan};
+use crate::tells::Tells;
 use crate::{ToolError, Tools};
 
 /// The time between two looks. It is a fifth of the other tools' shortest one, so the wait is
@@ -32,7 +33,7 @@ const POLL: Duration = Duration::from_millis(1);
 /// Longer delays are not told apart, in ns: a minute.
 const LONGEST_NS: u64 = 60_000_000_000;
 
-impl<W: Write> Tools<'_, W> {
+impl<W: Write, P: Tells> Tools<'_, W, P> {
     /// `topic delay`: measures the delays of `name` until a limit or the shutdown.
     ///
     /// # Errors
@@ -42,6 +43,7 @@ impl<W: Write> Tools<'_, W> {
             limits,
             pace: Pace::every(POLL),
             head: HEAD,
+            needs_clock: true,
             gauge: |_| Delays::default(),
         };
         self.measure(name, plan)

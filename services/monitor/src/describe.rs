@@ -8,6 +8,14 @@ use serde_json::json;
 
 use crate::{Count, ToolError, Tools};
 
+/// A topic's line in the list, with how many publishers, subscribers and observers it has.
+pub(crate) fn listed(name: &str, [publishers, subscribers, observers]: [usize; 3]) -> String {
+    let publishers = Count(publishers, "publisher").to_string();
+    let subscribers = Count(subscribers, "subscriber").to_string();
+    let observers = Count(observers, "observer");
+    format!("{name:30}  {publishers:>13}  {subscribers:>14}, {observers} among them")
+}
+
 impl<W: Write> Tools<'_, W> {
     /// `topic list`: every open topic on the bus, of every robot or only of the tools' robot.
     /// Returns how many there are.
@@ -17,17 +25,17 @@ impl<W: Write> Tools<'_, W> {
     pub fn list(&mut self, every_robot: bool) -> Result<usize, ToolError> {
         let topics = self
             .watchdog
-            .over("listing the topics", || self.bus.topics())?;
+            .over("listing the topics", || self.place.topics())?;
         let mut topics: Vec<_> = topics
             .into_iter()
-            .filter(|topic| every_robot || topic.unit == *self.bus.unit())
+            .filter(|topic| every_robot || topic.unit == *self.place.unit())
             .collect();
         topics.sort_by(|a, b| a.unit.cmp(&b.unit));
         let count = topics.len();
         if topics.is_empty() && !self.as_json {
             let of = match every_robot {
                 true => "on this bus".to_owned(),
-                false => format!("of the robot `{}`", self.bus.unit()),
+                false => format!("of the robot `{}`", self.place.unit()),
             };
             writeln!(self.out, "no topic {of} is open; `lager up` starts a robot")?;
         }
@@ -44,13 +52,8 @@ impl<W: Write> Tools<'_, W> {
             let name = format!("lager/{}/{}", topic.unit, topic.name);
             match topic.layout {
                 Layout::Ours | Layout::Described => {
-                    let publishers = Count(topic.publishers, "publisher").to_string();
-                    let subscribers = Count(topic.subscribers, "subscriber").to_string();
-                    let observers = Count(topic.observers, "observer");
-                    writeln!(
-                        self.out,
-                        "{name:30}  {publishers:>13}  {subscribers:>14}, {observers} among them"
-                    )?;
+                    let ends = [topic.publishers, topic.subscribers, topic.observers];
+                    writeln!(self.out, "{}", listed(&name, ends))?;
                 }
                 _ => writeln!(
                     self.out,
@@ -73,7 +76,7 @@ impl<W: Write> Tools<'_, W> {
         let live = self
             .watchdog
             .over("looking at the topic", || {
-                self.bus.topics_of(self.bus.unit())
+                self.place.topics_of(self.place.unit())
             })
             .into_iter()
             .find(|topic| topic.name == name);
@@ -161,9 +164,9 @@ impl<W: Write> Tools<'_, W> {
     fn info_of_found(&mut self, name: &str) -> Result<(), ToolError> {
         let topics = self
             .watchdog
-            .over("looking at the topic", || self.bus.topics())?;
+            .over("looking at the topic", || self.place.topics())?;
         let mut topics = topics.into_iter();
-        let topic = topics.find(|topic| topic.unit == *self.bus.unit() && topic.name == name);
+        let topic = topics.find(|topic| topic.unit == *self.place.unit() && topic.name == name);
         let described = topic.and_then(|mut topic| Some((topic.description.take()?, topic)));
         let (description, topic) = described.ok_or_else(|| UnknownTopic(name.to_owned()))?;
         let (publishers, subscribers) = (topic.publishers, topic.subscribers);

@@ -4,15 +4,15 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::time::Instant;
 
-use lager_home::Clock;
-use lager_ports::Source;
+use lager_ports::{Found, Source};
 use lager_sample::{Description, Stamp, Topic};
-use lager_topics::{TopicVisitor, by_id, visit};
+use lager_topics::{TopicVisitor, by_id};
 use lager_wake::urgency;
 use serde_json::{Value, json};
 
 use crate::block::Blocks;
 use crate::measure::Limits;
+use crate::place::Place;
 use crate::source::Shown;
 use crate::{Count, POLL, ToolError, Tools};
 
@@ -25,47 +25,37 @@ pub struct EchoConfig {
     pub limits: Limits,
 }
 
-impl<W: Write> Tools<'_, W> {
-    /// `topic echo`: each sample of `name`, or some of its fields, until a limit or the shutdown.
-    ///
-    /// # Errors
-    /// No topic has that name, its samples have no such field, it cannot be read, or the output
-    /// cannot be written.
-    pub fn echo(&mut self, name: &str, config: &EchoConfig) -> Result<(), ToolError> {
-        let tools = &mut *self;
-        match visit(name, Echo { tools, config }) {
-            Ok(echoed) => echoed,
-            Err(unknown) => {
-                let found = self.found(name, unknown)?;
-                must_have(found.description(), config)?;
-                let blocks = Blocks::of_found(&found)?;
-                self.echo_from(name, found, blocks, config)
-            }
-        }
-    }
-
-    /// The writer in words: its role if the bus knows it, and its process.
+impl<W: Write, P: Place> Tools<'_, W, P> {
+    /// The writer in words: its role if that is known, and its process.
     fn writer(&self, pid: u32) -> String {
-        let nodes = self
-            .watchdog
-            .over("looking for the writer", || self.bus.nodes());
-        let role = nodes
-            .unwrap_or_default()
-            .into_iter()
-            .find_map(|node| node.part.filter(|_| node.pid == pid));
-        match role {
+        let looked = || self.place.role_of(pid);
+        match self.watchdog.over("looking for the writer", looked) {
             Some(role) => format!("{role} ({pid})"),
             None => format!("process {pid}"),
         }
     }
 }
 
-struct Echo<'a, 'b, W> {
-    tools: &'a mut Tools<'b, W>,
-    config: &'a EchoConfig,
+impl<W: Write> Tools<'_, W> {
+    /// Shows a topic that carries its own description.
+    pub(crate) fn echo_found(
+        &mut self,
+        name: &str,
+        found: Found,
+        config: &EchoConfig,
+    ) -> Result<(), ToolError> {
+        must_have(found.description(), config)?;
+        let blocks = Blocks::of_found(found.name(), found.description())?;
+        self.echo_from(name, found, blocks, config)
+    }
 }
 
-fn must_have(description: &Description, config: &EchoConfig) -> Result<(), ToolError> {
+pub(crate) struct Echo<'a, 'b, W> {
+    pub(crate) tools: &'a mut Tools<'b, W>,
+    pub(crate) config: &'a EchoConfig,
+}
+
+pub(crate) fn must_have(description: &Description, config: &EchoConfig) -> Result<(), ToolError> {
     let mut fields = config.fields.iter();
     Ok(fields.try_for_each(|field| description.must_have(field))?)
 }
@@ -82,8 +72,8 @@ impl<W: Write> TopicVisitor for Echo<'_, '_, W> {
     }
 }
 
-impl<W: Write> Tools<'_, W> {
-    fn echo_from(
+impl<W: Write, P: Place> Tools<'_, W, P> {
+    pub(crate) fn echo_from(
         &mut self,
         name: &str,
         mut from: impl Source,
@@ -103,7 +93,7 @@ impl<W: Write> Tools<'_, W> {
             };
             let payload = payload?;
             heard = Instant::now();
-            let received_ns = Clock::monotonic_ns();
+            let received_ns = self.place.now_ns();
             if self.as_json {
                 let value = json!({
                     "topic": name, "sequence": stamp.sequence, "epoch": stamp.epoch,

@@ -5,6 +5,9 @@
 //! `pub` moves no robot by mistake: it holds the locks of the robot's name and of its bridge. If
 //! the robot is up, it needs `--live`, and then writes only topics that several programs may write.
 //!
+//! Where samples come from is a [`Place`]: the bus, or with the feature `zenoh` a robot's gateway on
+//! another computer (`remote.rs`). The tools are the same.
+//!
 //! All tools but `pub` are observers: they poll, hold no listener and never slow the path. They
 //! know no topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`.
 //! The table leads from a name to its static type. A topic that is not in the table carries its own
@@ -18,11 +21,15 @@ mod describe;
 mod durations;
 mod echo;
 mod measure;
+mod place;
 mod publish;
 mod python;
 mod rate;
+#[cfg(feature = "zenoh")]
+mod remote;
 mod sentence;
 mod source;
+mod tells;
 mod top;
 
 use std::fmt;
@@ -37,8 +44,10 @@ use lager_wake::{Shutdown, Watchdog};
 
 pub use echo::EchoConfig;
 pub use measure::Limits;
+pub use place::Place;
 pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
+pub use tells::Tells;
 pub use top::{Lacking, Load, Recorded, TopConfig, leave_screen};
 
 /// How often `topic echo` and `top` look.
@@ -46,9 +55,9 @@ const POLL: Duration = Duration::from_millis(5);
 
 /// What a tool works with. Each tool is a method of it.
 #[derive(Debug)]
-pub struct Tools<'a, W> {
-    /// The bus, as an observer of the robot.
-    pub bus: &'a Bus,
+pub struct Tools<'a, W, P = Bus> {
+    /// The bus, as an observer of the robot, or another place where samples come from.
+    pub place: &'a P,
     /// Guards the calls into the bus.
     pub watchdog: &'a Watchdog,
     /// The request to end.
@@ -61,7 +70,7 @@ pub struct Tools<'a, W> {
 
 impl<W: Write> Tools<'_, W> {
     fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, ToolError> {
-        let open = || self.bus.subscriber();
+        let open = || self.place.subscriber();
         Ok(self.watchdog.over("opening the topic", open)?)
     }
 
@@ -69,10 +78,12 @@ impl<W: Write> Tools<'_, W> {
     fn found(&self, name: &str, unknown: UnknownTopic) -> Result<Found, ToolError> {
         let found = self
             .watchdog
-            .over("opening the topic", || self.bus.found(name))?;
+            .over("opening the topic", || self.place.found(name))?;
         found.ok_or(ToolError::Unknown(unknown))
     }
+}
 
+impl<W: Write, P: Place> Tools<'_, W, P> {
     fn receive<L: Look>(
         &self,
         from: &mut impl Source,
@@ -89,9 +100,7 @@ impl<W: Write> Tools<'_, W> {
             if let Some(shortage) = Shortage::now() {
                 return Err(ToolError::Short(shortage));
             }
-            if !self.bus.is_listed() {
-                return Err(ToolError::Cleared);
-            }
+            self.place.may_still_tell()?;
         }
         std::thread::sleep(pace);
         Ok(())
@@ -130,6 +139,16 @@ pub enum ToolError {
     /// No sample has such a field.
     #[error(transparent)]
     NoField(#[from] NoField),
+    /// A robot's gateway does not tell it.
+    #[cfg(feature = "zenoh")]
+    #[error(transparent)]
+    Remote(#[from] lager_remote::RemoteError),
+    /// The times of samples are of a clock that this machine does not have.
+    #[error(
+        "the robot is another machine, whose clock this one does not have, so delays between them \
+         cannot be told; run this tool on the robot"
+    )]
+    OtherClock,
     /// A sample could not be put into JSON.
     #[error("cannot put a sample into JSON: {0}")]
     Json(#[from] serde_json::Error),

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 use lager_home::Clock;
 use lager_ports::Source;
 use lager_sample::{Stamp, Topic};
-use lager_topics::{TopicVisitor, visit};
+use lager_topics::TopicVisitor;
 use lager_wake::Pace;
 use serde_json::{Value, json};
 
+use crate::place::Place;
 use crate::source::Stamped;
 use crate::{ToolError, Tools};
 
@@ -65,28 +66,14 @@ pub(crate) struct Plan<F> {
     pub(crate) pace: Pace,
     /// The head line; empty for none.
     pub(crate) head: &'static str,
+    /// Whether it compares stamps with this machine's clock.
+    pub(crate) needs_clock: bool,
     /// Makes a gauge for payloads of this many bytes.
     pub(crate) gauge: F,
 }
 
-impl<W: Write> Tools<'_, W> {
-    pub(crate) fn measure<G: Gauge, F: Fn(usize) -> G>(
-        &mut self,
-        name: &str,
-        plan: Plan<F>,
-    ) -> Result<(), ToolError> {
-        let tools = &mut *self;
-        match visit(name, Measure { tools, plan: &plan }) {
-            Ok(measured) => measured,
-            Err(unknown) => {
-                let found = self.found(name, unknown)?;
-                let size = found.description().size();
-                self.measure_from(name, size, found, &plan)
-            }
-        }
-    }
-
-    fn measure_from<G: Gauge, F: Fn(usize) -> G>(
+impl<W: Write, P: Place> Tools<'_, W, P> {
+    pub(crate) fn measure_from<G: Gauge, F: Fn(usize) -> G>(
         &mut self,
         name: &str,
         size: usize,
@@ -147,9 +134,9 @@ impl<W: Write> Tools<'_, W> {
     }
 }
 
-struct Measure<'a, 'b, W, F> {
-    tools: &'a mut Tools<'b, W>,
-    plan: &'a Plan<F>,
+pub(crate) struct Measure<'a, 'b, W, F> {
+    pub(crate) tools: &'a mut Tools<'b, W>,
+    pub(crate) plan: &'a Plan<F>,
 }
 
 impl<W: Write, G: Gauge, F: Fn(usize) -> G> TopicVisitor for Measure<'_, '_, W, F> {

@@ -117,9 +117,9 @@ impl<W: Write> Tools<'_, W> {
     /// A robot is up or somebody else writes the topic, nobody knows the topic, or a payload does
     /// not fit it.
     pub fn publish(&mut self, name: &str, what: &Publishing) -> Result<(), PublishError> {
-        let permit = || permit(self.bus, name, what.live);
+        let permit = || permit(self.place, name, what.live);
         let _locks = self.watchdog.over("looking at the topic", permit)?;
-        let open = || self.bus.any_publisher(name);
+        let open = || self.place.any_publisher(name);
         let publisher = self.watchdog.over("opening the topic", open)?;
         let publisher = publisher.ok_or_else(|| PublishError::Unknown(name.to_owned()))?;
         // Refuse a wrong payload before the wait for readers.

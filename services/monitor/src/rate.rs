@@ -8,9 +8,10 @@ use lager_wake::Pace;
 use serde_json::{Value, json};
 
 use crate::measure::{Arrival, Gauge, Limits, Plan};
+use crate::tells::Tells;
 use crate::{ToolError, Tools};
 
-impl<W: Write> Tools<'_, W> {
+impl<W: Write, P: Tells> Tools<'_, W, P> {
     /// `topic hz`: measures the rate of `name` until a limit or the shutdown.
     ///
     /// # Errors
@@ -38,6 +39,7 @@ fn plan<F>(limits: Limits, gauge: F) -> Plan<F> {
         limits,
         pace: Pace::counting(),
         head: "",
+        needs_clock: false,
         gauge,
     }
 }

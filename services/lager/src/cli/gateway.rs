@@ -3,7 +3,8 @@
 use std::net::SocketAddr;
 
 use clap::Args;
-use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS};
+use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS, USUAL_ZENOH};
+use lager_remote::Endpoint;
 
 use super::{ServiceArgs, values};
 
@@ -13,13 +14,16 @@ use super::{ServiceArgs, values};
   lager gateway                                  figures at http://127.0.0.1:7430/metrics
   lager gateway --metrics 192.168.1.4:7430       for a Prometheus on another machine
   lager gateway --foxglove                       live views at ws://127.0.0.1:8765
-  lager up --metrics --foxglove                  both, started with the robot
+  lager gateway --zenoh                          samples for listeners of this machine
+  lager gateway --zenoh tls/192.168.1.4:7447     for the network, with the certificates of [gateway.zenoh]
+  lager up --metrics --foxglove --zenoh          all of it, started with the robot
 
 It only reads the bus. Everybody who reaches an address may read, without a password. Pages in a
 browser of that machine may read the live views as well. Ask for figures by an address in digits, not
 by a name: somebody else could have pointed a name to this machine. Import
 services/gateway/grafana.json into Grafana, and services/gateway/foxglove.json as a layout into
-Foxglove. --foxglove needs a program that was built with `cargo build --release --features foxglove`.")]
+Foxglove. --foxglove and --zenoh need a program that was built with `cargo build --release --features
+foxglove,zenoh`. services/remote/README.md says what Zenoh's listeners get.")]
 pub struct GatewayArgs {
     /// Where Prometheus reads figures [default: from the configuration, or 127.0.0.1:7430]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, value_parser = values::listens, help_heading = "Outside")]
@@ -28,6 +32,10 @@ pub struct GatewayArgs {
     /// configuration]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, value_parser = values::listens, help_heading = "Outside")]
     pub foxglove: Option<SocketAddr>,
+    /// Where listeners connect with Zenoh; without ENDPOINT at tcp/127.0.0.1:7447, for programs of
+    /// this machine [default: from the configuration]
+    #[arg(long, value_name = "ENDPOINT", num_args = 0..=1, default_missing_value = USUAL_ZENOH, help_heading = "Outside")]
+    pub zenoh: Option<Endpoint>,
     /// What `up` tells every service
     #[command(flatten)]
     pub service: ServiceArgs,

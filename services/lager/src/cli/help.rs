@@ -27,6 +27,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "board",
             "report",
             "config",
+            "keys",
             "completions",
             "manual",
         ],

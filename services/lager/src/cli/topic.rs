@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use lager_monitor::Limits;
+use lager_remote::Endpoint;
 
 use super::values;
 
@@ -17,6 +18,7 @@ use super::values;
   lager topic hz sensor/line --duration 10
   lager topic delay sensor/line
   lager topic bw truth/pose --json
+  lager topic echo nav/status --remote tls/192.168.1.4:7447
   lager topic pub weather/now '{\"wind\": 3200}' --rate 10 --duration 60
 
 --count is a number of samples everywhere, and --duration a number of seconds; what comes
@@ -29,6 +31,10 @@ pub struct TopicArgs {
     /// Print JSON, one value in each line
     #[arg(long, global = true, help_heading = "Output")]
     pub json: bool,
+    /// Look at a robot on another computer, at this endpoint of its `lager gateway --zenoh`; for
+    /// list, echo, hz, bw and delay
+    #[arg(long, global = true, value_name = "ENDPOINT", help_heading = "Robot")]
+    pub remote: Option<Endpoint>,
 }
 
 /// Which topic to watch, and for how long.

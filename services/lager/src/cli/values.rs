@@ -434,6 +434,8 @@ mod tests {
             (&["up", "--metrics", "70000"], "as in 7410"),
             (&["station", "--panel", ":7410"], "as in 7410"),
             (&["gateway", "--foxglove", "x:y"], "as in 7410"),
+            (&["gateway", "--zenoh", "7447"], "tcp/127.0.0.1:7447"),
+            (&["up", "--zenoh", "udp/[::]:7447"], "tcp/127.0.0.1:7447"),
             (&["up", "--station", "somewhere"], "as in 7420"),
             (&["comm", "--station", "192.168.1.5:0"], "as in 7420"),
             (&["topic", "hz", "nav/statsu"], "did you mean `nav/status`?"),

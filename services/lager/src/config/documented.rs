@@ -10,10 +10,11 @@ use super::section::{Declared, Section};
 use super::{
     BatterySection, BusSection, ButtonsSection, ChipSection, CommSection, Config, GatewaySection,
     LogSection, LogicSection, RealtimeSection, SerialSection, SimulatorSection, StationSection,
+    ZenohSection,
 };
 
 /// Every section, in the order of the file.
-const SECTIONS: [Section; 24] = [
+const SECTIONS: [Section; 26] = [
     Config::SECTION,
     LogSection::SECTION,
     BusSection::SECTION,
@@ -54,6 +55,12 @@ const SECTIONS: [Section; 24] = [
     CommSection::SECTION,
     ButtonsSection::SECTION,
     GatewaySection::SECTION,
+    ZenohSection::SECTION,
+    Section {
+        name: "gateway.zenoh.rates",
+        about: &[],
+        keys: &[],
+    },
 ];
 
 /// A section of joints, whose names explain them. The key of the profile explains the section.
@@ -268,6 +275,14 @@ mod tests {
             gateway: GatewaySection {
                 metrics: Some("127.0.0.1:7431".parse().expect("an address")),
                 foxglove: Some("127.0.0.1:8766".parse().expect("an address")),
+                zenoh: ZenohSection {
+                    endpoint: Some("tls/0.0.0.0:7448".parse().expect("an endpoint")),
+                    topics: vec!["sensor/*".into(), "nav/status".into()],
+                    authority: Some("/etc/lager/ca.pem".into()),
+                    certificate: Some("/etc/lager/r1.pem".into()),
+                    key: Some("/etc/lager/r1.key".into()),
+                    rates: [("sensor/line".into(), 10.0)].into(),
+                },
             },
             ..Config::default()
         };

@@ -1,8 +1,11 @@
 //! `[gateway]`: where programs outside the robot may look at it.
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 
 use lager_gateway::Addresses;
+use lager_remote::{Allowed, Endpoint, Proof, Settings, SettingsError};
 
 use super::section::section;
 use crate::address::in_config;
@@ -20,20 +23,75 @@ section! {
         /// with the feature foxglove.
         #[serde(deserialize_with = "in_config")]
         pub foxglove: Option<SocketAddr> = None,
+        /// Listeners that get the samples themselves, over Zenoh; services/remote/README.md says
+        /// how. The program must be built with the feature zenoh.
+        pub zenoh: ZenohSection = ZenohSection::default(),
+    }
+}
+
+section! {
+    "gateway.zenoh"
+    pub struct ZenohSection {
+        /// Where listeners connect: "tcp/127.0.0.1:7447" for programs of this machine,
+        /// "unixsock-stream//run/lager/zenoh" for its users in the group of that file, or
+        /// "tls/0.0.0.0:7447" for the network, with the three files below. Unset, nowhere.
+        pub endpoint: Option<Endpoint> = None,
+        /// Which topics are sent: names, all below a name as in "sensor/*", or "*" for every topic.
+        pub topics: Vec<String> = vec!["*".into()],
+        /// For TLS: the certificate of the authority whose listeners are let in. `lager keys` makes
+        /// all three files.
+        pub authority: Option<PathBuf> = None,
+        /// The robot's certificate, which names the robot.
+        pub certificate: Option<PathBuf> = None,
+        /// The private key of that certificate.
+        pub key: Option<PathBuf> = None,
+        /// How many samples a second of a topic are sent at most, as in "sensor/line" = 10. Of a
+        /// state, the newest one is always sent when it is due. What is left out is counted.
+        pub rates: BTreeMap<String, f64> = BTreeMap::new(),
     }
 }
 
 impl GatewaySection {
     /// Whether `up` starts a gateway.
     pub fn is_wanted(&self) -> bool {
-        self.addresses() != Addresses::default()
+        self.metrics.is_some() || self.foxglove.is_some() || self.zenoh.endpoint.is_some()
     }
 
     /// The section in the form of the gateway.
-    pub fn addresses(&self) -> Addresses {
-        Addresses {
+    ///
+    /// # Errors
+    /// No listener could be served so.
+    pub fn addresses(&self) -> Result<Addresses, SettingsError> {
+        Ok(Addresses {
             metrics: self.metrics,
             foxglove: self.foxglove,
-        }
+            zenoh: self.zenoh.settings(None)?,
+        })
+    }
+}
+
+impl ZenohSection {
+    /// The section in the form of the gateway, with another endpoint if one is given; `None` if it
+    /// names none.
+    ///
+    /// # Errors
+    /// No listener could be served so.
+    pub fn settings(&self, other: Option<Endpoint>) -> Result<Option<Settings>, SettingsError> {
+        let allowed = Allowed::new(&self.topics, &self.rates)?;
+        let proof = self.proof()?;
+        let Some(endpoint) = other.or_else(|| self.endpoint.clone()) else {
+            return Ok(None);
+        };
+        Settings::new(endpoint, allowed, proof).map(Some)
+    }
+
+    /// The files by which this end proves who it is, if they are named.
+    ///
+    /// # Errors
+    /// Only some of them are named.
+    pub fn proof(&self) -> Result<Option<Proof>, SettingsError> {
+        let files = [&self.authority, &self.certificate, &self.key];
+        let [authority, certificate, key] = files.map(Clone::clone);
+        Proof::of(authority, certificate, key)
     }
 }

@@ -64,11 +64,11 @@ impl<W: Write> Tools<'_, W> {
     /// # Errors
     /// The bus cannot be read, or the terminal cannot be used.
     pub fn top(&mut self, config: &TopConfig) -> Result<(), ToolError> {
-        let mut model = Model::new(self.bus.unit().as_str());
+        let mut model = Model::new(self.place.unit().as_str());
         model.view.filter.clone_from(&config.filter);
         model.head.battery = Battery::new(config.pack);
         urgency::wake_with_others(POLL);
-        let mut feed = Feed::new(self.bus, self.watchdog, config.load)?;
+        let mut feed = Feed::new(self.place, self.watchdog, config.load)?;
         feed.look(&mut model)?;
         model.end_window(Clock::monotonic_ns());
         let Some(long) = config.once else {
@@ -97,7 +97,7 @@ impl<W: Write> Tools<'_, W> {
             feed.drain(model)?;
             if looked.elapsed() >= WINDOW {
                 looked = Instant::now();
-                if !self.bus.is_listed() {
+                if !self.place.is_listed() {
                     return Err(ToolError::Cleared);
                 }
                 feed.look(model)?;
