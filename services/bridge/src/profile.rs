@@ -31,8 +31,8 @@ use lager_sample::hash;
 use lager_topics::{Ask, Health, Part, ProfileState};
 use lager_wire::link::Up;
 use lager_wire::{
-    ArmProfile, Callsign, Profile, RobotProfile, SensorProfile, Setting, SettingReply,
-    SettingStatus, SteeringProfile, Version,
+    ArmProfile, Callsign, LIMP, Profile, RobotProfile, SensorProfile, Setting, SettingKey,
+    SettingReply, SettingStatus, SteeringProfile, Version,
 };
 
 use crate::arbiter::Gate;
@@ -160,8 +160,12 @@ impl Profiles {
         ]
     }
 
-    /// Whether the wheels may move, by what both boards know.
+    /// Whether the wheels may move, by what both boards know. A limp arm hangs somewhere, and a person
+    /// may have his hands at it.
     pub fn wheels(&self) -> Gate {
+        if self.tellers[2].settings.first().is_some_and(is_limp) {
+            return Gate::Held;
+        }
         let [steering, sensors, _] = self.tellers.each_ref().map(ProfileTeller::gate);
         match (steering, sensors) {
             (Gate::Open, gate) | (gate, Gate::Open) => gate,
@@ -187,6 +191,11 @@ impl Profiles {
     fn parts(&mut self) -> impl Iterator<Item = (Part, &mut ProfileTeller)> {
         Part::ALL.into_iter().zip(&mut self.tellers)
     }
+}
+
+/// Whether a setting makes the arm limp.
+fn is_limp(setting: &Setting) -> bool {
+    setting.key == SettingKey::ArmTorqueLimit && setting.value == LIMP.cast_signed()
 }
 
 /// A hash of all settings. It is folded, because half of one tells two descriptions apart as well.
@@ -324,7 +333,7 @@ impl ProfileTeller {
 
 #[cfg(test)]
 mod tests {
-    use lager_wire::{ResetCause, SettingKey};
+    use lager_wire::ResetCause;
 
     use super::*;
 
@@ -559,6 +568,25 @@ mod tests {
         assert_eq!(profiles.state(Part::Steering), ProfileState::Accepted);
         assert_eq!(profiles.wheels(), Gate::Open);
         assert_ne!(profiles.told, before);
+    }
+
+    #[test]
+    fn while_the_arm_is_limp_the_wheels_stand() {
+        let mut robot = RobotProfile::default();
+        let mut profiles = Profiles::new(&robot, None);
+        for callsign in [Callsign::Sensor, Callsign::Steering] {
+            profiles.board_up(ms(0), &board(callsign, true));
+            obey(&mut profiles, callsign);
+        }
+        for (torque_limit, gate) in [(LIMP, Gate::Held), (600, Gate::Open)] {
+            robot.arm.torque_limit = torque_limit;
+            robot.arm.squeeze_load = 300;
+            let ask = Ask::describe(Part::Arm, &robot);
+            assert!(profiles.describe(ms(0), Part::Arm, &ask, Version::One));
+            obey(&mut profiles, Callsign::Steering);
+            assert_eq!(profiles.state(Part::Arm), ProfileState::Accepted);
+            assert_eq!(profiles.wheels(), gate);
+        }
     }
 
     #[test]

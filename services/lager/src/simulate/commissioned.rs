@@ -1,30 +1,39 @@
 //! Robots that nobody has described are commissioned by a person who answers from what he sees, and
-//! deliver afterwards. Only which servos the arm has stands in the description before: no question
-//! finds that out.
+//! deliver afterwards. Before that they fail, and say why.
 
 use std::f64::consts::TAU;
 use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
-use lager_commission::{Answer, Built, Commissioning, Effect, Question, Step, Way};
+use lager_commission::{Answer, Built, Commissioning, Effect, Joint, Question, Step, Takes, Way};
 use lager_orders::{Language, Mode, Moment};
 use lager_plant::{Build, Pose};
 use lager_simulator::Wire;
 use lager_stop::Stop;
 use lager_supervisor::mission::{Helper, Mission, Watch};
-use lager_topics::{Ask, AskKind, BridgeAnswer, Part, Role, StopCause};
-use lager_wire::ResetCause;
+use lager_topics::{Ask, AskKind, BridgeAnswer, Origin, Part, Role, SteeringOrder, StopCause};
+use lager_wire::{ArmPose, ArmProfile, Command, OneOrTwo, ResetCause, SERVO_MAX, WheelCommand};
 
 use super::Whole;
-use super::built::{LIMIT, described_arm, robot, seeds};
+use super::built::{LIMIT, robot, seeds};
 use crate::config::Config;
 
 /// Virtual time in which a robot must be commissioned.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_secs(600);
 /// How long a person takes until he answers.
 const REACTION: Duration = Duration::from_millis(700);
 /// How late he is where he watches a robot that moves.
 const LATE: Duration = Duration::from_millis(80);
+/// How often a key repeats that is held.
+const REPEATS: Duration = Duration::from_millis(40);
+/// A joint that has stood for so long has gone as far as it goes.
+const STANDS: Duration = Duration::from_millis(500);
+/// How long a button is held at least, and let go.
+const PRESS: Duration = Duration::from_millis(1_000);
+/// As far as this from the ends of what a servo measures a joint may go, if nothing stops it before.
+const LEAST: u16 = 64;
+/// Where the arm rests when a person lays it down.
+const LYING: u16 = 300;
 /// How far he moves the line sensors to either side, in mm, and in how many seconds to and fro.
 const SWAY: (f64, f64) = (60.0, 1.6);
 /// Where the line sensors are over bare floor, and where the robot has room to turn.
@@ -94,8 +103,25 @@ struct Person {
     there: Option<Duration>,
     /// How the wheels turned last.
     ways: [Way; 2],
+    /// The button, where one is to be held.
+    button: Button,
     said: Vec<String>,
     kept: Option<Built>,
+}
+
+/// A button that a person holds and lets go.
+#[derive(Clone, Copy, Default)]
+struct Button {
+    is_held: bool,
+    /// Since when it is so, and when the key was repeated last.
+    since: Duration,
+    repeated: Duration,
+    /// How often it was held.
+    times: u8,
+    /// Where the servos were before, and where they are, since when.
+    from: [u16; 8],
+    at: [u16; 8],
+    stands: Duration,
 }
 
 impl Person {
@@ -113,6 +139,7 @@ impl Person {
             begun: LINE,
             there: None,
             ways: [Way::Still; 2],
+            button: Button::default(),
             said: Vec::new(),
             kept: None,
         };
@@ -184,6 +211,9 @@ impl Person {
         let Some((question, since)) = self.asked else {
             return self.watch();
         };
+        if question.takes() == Takes::Hold {
+            return self.press(question);
+        }
         let pose = self.whole.robot.world().pose();
         let is_there = match question {
             Question::TurnRound => pose.heading - self.begun.heading >= TAU,
@@ -204,7 +234,26 @@ impl Person {
     /// What a person does before he answers.
     fn prepare(&mut self, question: Question) {
         self.begun = self.whole.robot.world().pose();
+        let positions = self.whole.robot.world().state().servo_positions;
+        self.button = Button {
+            from: positions,
+            at: positions,
+            since: self.whole.now,
+            ..Button::default()
+        };
+        let shown = self.machine().joint();
         let world = self.whole.robot.world_mut();
+        let drawn = ArmProfile::default();
+        let mut pose = |pose: ArmPose| {
+            for (joint, position) in [
+                (Joint::Base, pose.base),
+                (Joint::Shoulder, pose.shoulder),
+                (Joint::Elbow, pose.elbow),
+                (Joint::Wrist, pose.wrist),
+            ] {
+                world.servos().bring(joint.servo(), position.into());
+            }
+        };
         match question {
             Question::LineFloor => world.place(FLOOR),
             Question::LineSway | Question::LineTape | Question::Speed => world.place(LINE),
@@ -215,8 +264,75 @@ impl Person {
                 world.lift();
             }
             Question::Turn => world.place(ROOM),
+            Question::JointEnd => {
+                let (joint, is_upper) = shown.expect("a joint");
+                if (joint, is_upper) == (Joint::Base, false) {
+                    for lying in [Joint::Shoulder, Joint::Elbow] {
+                        world.servos().bring(lying.servo(), LYING.into());
+                    }
+                }
+                let to = match (joint, is_upper) {
+                    (Joint::Gripper, false) => 0,
+                    (_, false) => LEAST,
+                    (Joint::Gripper, true) => drawn.gripper_open,
+                    (_, true) => SERVO_MAX - LEAST,
+                };
+                world.servos().bring(joint.servo(), to.into());
+            }
+            Question::PoseReach => {
+                let logic = Config::default().logic;
+                pose(ArmPose {
+                    shoulder: logic.reach_shoulder,
+                    elbow: logic.reach_elbow,
+                    ..drawn.carry
+                });
+            }
+            Question::PoseCarry => pose(drawn.carry),
+            Question::PoseDrop => pose(drawn.drop),
+            Question::PoseNeutral => pose(drawn.neutral),
+            Question::Finish => world.fill_claw(false),
             _ => {}
         }
+    }
+
+    /// Holds the button until what moves stands, lets it go, and answers when everything was seen.
+    fn press(&mut self, question: Question) {
+        let now = self.whole.now;
+        let moment = self.whole.moment();
+        let positions = self.whole.robot.world().state().servo_positions;
+        let mut button = self.button;
+        if positions != button.at {
+            (button.at, button.stands) = (positions, now);
+        }
+        let is_long = now >= button.since + PRESS;
+        let wanted = if question == Question::JointMoves {
+            1
+        } else {
+            2
+        };
+        if button.is_held {
+            if is_long && now >= button.stands + STANDS {
+                (button.is_held, button.since) = (false, now);
+            } else if now >= button.repeated + REPEATS {
+                button.repeated = now;
+                self.machine().answer(moment, Answer::Hold);
+            }
+        } else if is_long && button.times < wanted {
+            if question == Question::ClawFull && button.times == 1 {
+                self.whole.robot.world_mut().fill_claw(true);
+            }
+            (button.is_held, button.since, button.stands) = (true, now, now);
+            button.times += 1;
+        } else if is_long {
+            self.asked = None;
+            let goes_well = self.machine().joint().is_none_or(|(joint, grows)| {
+                let servo = joint.servo();
+                grows == (positions[servo] > button.from[servo])
+            });
+            let answer = if goes_well { Answer::Yes } else { Answer::No };
+            self.machine().answer(moment, answer);
+        }
+        self.button = button;
     }
 
     /// What a person does and sees while nothing is asked.
@@ -297,17 +413,9 @@ impl Person {
     }
 }
 
-/// A robot of which nobody has said more than which servos its arm has.
-fn unknown(build: &Build) -> Config {
-    Config {
-        arm: described_arm(&build.arm),
-        ..Config::default()
-    }
-}
-
 /// The same robot, started again as it was commissioned, at the start of its warehouse.
 fn restarted(person: Person, built: &Built, seed: u64) -> Whole {
-    let mut config = unknown(&person.build);
+    let mut config = Config::default();
     config.take_commissioned(built);
     let mut whole = robot(&config, person.build, seed);
     whole.robot = person.whole.robot;
@@ -320,7 +428,7 @@ fn restarted(person: Person, built: &Built, seed: u64) -> Whole {
 fn a_robot_that_nobody_described_is_commissioned_and_delivers() {
     for seed in seeds() {
         let build = Build::drawn(seed);
-        let mut person = Person::new(&unknown(&build), build, seed);
+        let mut person = Person::new(&Config::default(), build, seed);
         let built = person.commission();
         let wheels = built.robot.steering.wheels;
         let turn_s = f64::from(wheels.full_turn_ms) / 1_000.0;
@@ -336,6 +444,7 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers() {
             build.reversed,
             "seed {seed}"
         );
+        assert_arm(&built.robot.arm, &build, seed);
         let mut whole = restarted(person, &built, seed);
         let limit = whole.now + LIMIT;
         assert_eq!(whole.run(limit), None, "seed {seed}: {build:?} {built:?}");
@@ -344,16 +453,56 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers() {
 }
 
 #[test]
-fn before_that_it_fails_and_says_why_if_its_build_matters() {
+fn before_that_it_fails_and_says_why() {
     for seed in seeds() {
         let build = Build::drawn(seed);
-        if !(build.swapped || build.reversed != [false; 2] || build.dark_is_low) {
-            continue;
-        }
-        let mut whole = robot(&unknown(&build), build, seed);
+        let mut whole = robot(&Config::default(), build, seed);
         let why = whole.run(LIMIT).expect("it cannot deliver");
+        println!("seed {seed}: {why}");
         assert!(whole.failure_kind().is_some(), "seed {seed}: {why}");
     }
+}
+
+/// The arm is known as it is built.
+fn assert_arm(found: &ArmProfile, build: &Build, seed: u64) {
+    let arm = &build.arm;
+    let values = found.servo_values();
+    for joint in Joint::ALL {
+        let first = joint.servo();
+        let [one, other] = [first, (first + 1).min(7)].map(|index| arm.ids[index]);
+        let pair = match joint {
+            Joint::Shoulder => Some(found.servos.shoulder),
+            Joint::Elbow => Some(found.servos.elbow),
+            _ => None,
+        };
+        // Of two that face each other, one counts as drawn, and that one is the first.
+        if let (Some(OneOrTwo::Two(pair)), Some(one), Some(other)) = (pair, one, other) {
+            let counts = if arm.reversed[first] {
+                [other, one]
+            } else {
+                [one, other]
+            };
+            assert_eq!(pair, counts, "seed {seed}: {joint:?}");
+            continue;
+        }
+        assert!(
+            !matches!(pair, Some(OneOrTwo::Two(_))),
+            "seed {seed}: {joint:?}"
+        );
+        assert_eq!(Some(values[first] as u8), one, "seed {seed}: {joint:?}");
+        let is_reversed = values[first] & lager_wire::REVERSED != 0;
+        assert_eq!(is_reversed, arm.reversed[first], "seed {seed}: {joint:?}");
+    }
+    let closed = ArmProfile::default()
+        .gripper_closed
+        .strict_add_signed(arm.offsets[7]);
+    assert!(
+        found.gripper_closed.abs_diff(closed) <= 6,
+        "seed {seed}: {found:?}"
+    );
+    let [lower, upper] = arm.ends[0].map(|end| end.strict_add_signed(arm.offsets[0]));
+    let told = found.limits.base;
+    assert_eq!([told.lowest, told.highest], [lower, upper], "seed {seed}");
 }
 
 #[test]
@@ -385,7 +534,7 @@ fn it_begins_only_with_boards_that_a_person_may_move() {
 
 #[test]
 fn whoever_quits_leaves_the_boards_with_what_they_were_told_before() {
-    let mut person = Person::new(&unknown(&Build::drawn(1)), Build::drawn(1), 1);
+    let mut person = Person::new(&Config::default(), Build::drawn(1), 1);
     let before = person.health().description;
     person.until(Question::WheelsLeft);
     assert_ne!(person.health().description, before);
@@ -474,6 +623,141 @@ fn a_stop_and_a_board_that_restarts_end_the_step_and_the_robot_stands() {
     assert!(
         person.machine().built().robot.sensors.ranger.model == Config::default().distance.model
     );
+}
+
+/// Where the servos are, as drawn.
+fn servos(person: &Person) -> [u16; 8] {
+    person.whole.robot.world().state().servo_positions
+}
+
+#[test]
+fn a_joint_moves_only_while_the_button_is_held_and_by_itself() {
+    let mut person = Person::new(&Config::default(), Build::default(), 1);
+    person.until(Question::JointMoves);
+    let before = servos(&person);
+    person.wait(Duration::from_secs(5));
+    assert_eq!(servos(&person), before, "nobody holds the button");
+
+    person.say(Answer::Hold);
+    person.wait(Duration::from_millis(300));
+    let moving = servos(&person);
+    assert_ne!(moving[0], before[0]);
+    assert_eq!(moving[1..], before[1..], "one joint at a time");
+    person.wait(Duration::from_secs(1));
+    let stands = servos(&person);
+    person.wait(Duration::from_secs(2));
+    assert_eq!(servos(&person), stands, "one press lasts a moment");
+    assert_eq!(person.machine().question(), Some(Question::JointMoves));
+
+    person.say(Answer::Hold);
+    person.wait(Duration::from_millis(200));
+    assert_ne!(servos(&person), stands);
+    person.stop();
+    person.wait(Duration::from_millis(300));
+    let stopped = servos(&person);
+    for _ in 0..50 {
+        person.say(Answer::Hold);
+        person.wait(Duration::from_millis(40));
+    }
+    assert_eq!(servos(&person), stopped, "the stop wins");
+    let said = person.said.join("; ");
+    assert!(said.contains("the robot is stopped"), "{said}");
+}
+
+#[test]
+fn a_joint_stops_when_nobody_is_there_any_more_who_renews_its_order() {
+    let mut person = Person::new(&Config::default(), Build::default(), 1);
+    person.until(Question::JointMoves);
+    let before = servos(&person);
+    person.say(Answer::Hold);
+    person.wait(Duration::from_millis(200));
+    assert_ne!(servos(&person), before);
+    // The process that commissions is dead.
+    person.whole.wizard = None;
+    let mut run = |span: u64| {
+        let end = person.whole.now + Duration::from_millis(span);
+        while person.whole.now < end {
+            let _ = person.whole.turn();
+        }
+        servos(&person)
+    };
+    let stands = run(500);
+    assert_eq!(run(2_000), stands);
+}
+
+/// The duties while somebody orders the robot to drive.
+fn drives(person: &mut Person, id: u32) -> [i16; 2] {
+    for _ in 0..10 {
+        person.whole.orders.push(SteeringOrder {
+            given_ns: person.whole.moment().ns,
+            id,
+            origin: Origin::Operator.into(),
+            code: Command::Wheel(WheelCommand::ManualForward).code(),
+            ..SteeringOrder::default()
+        });
+        person.whole.stirred = true;
+        person.wait(Duration::from_millis(20));
+    }
+    person.duties()
+}
+
+#[test]
+fn the_wheels_stand_while_the_arm_is_limp_and_whoever_quits_gives_it_its_strength_back() {
+    let mut person = Person::new(&Config::default(), Build::default(), 1);
+    person.until(Question::PoseDrop);
+    person.wait(Duration::from_secs(1));
+    assert_eq!(drives(&mut person, 4_711), [0, 0]);
+    // The arm sinks if nobody holds it.
+    let now = person.whole.moment();
+    person.machine().quit(now);
+    person.wait(Duration::from_secs(1));
+    assert!(person.machine().is_over());
+    assert_ne!(drives(&mut person, 4_712), [0, 0]);
+    let holds = servos(&person);
+    person.wait(Duration::from_secs(5));
+    assert_eq!(servos(&person), holds);
+}
+
+#[test]
+fn servos_that_are_too_few_or_do_not_move_are_named_and_asked_for_again() {
+    let mut arm = lager_plant::ArmBuild::default();
+    (arm.ids[2], arm.ids[4]) = (None, None);
+    let build = Build {
+        arm,
+        ..Build::default()
+    };
+    let mut person = Person::new(&Config::default(), build, 1);
+    person
+        .whole
+        .robot
+        .world_mut()
+        .servos()
+        .set_present(7, false);
+    person.until(Question::Arm);
+    person.said.clear();
+    person.say(Answer::Yes);
+    person.wait(Duration::from_secs(60));
+    let said = person.said.join("; ");
+    assert!(
+        said.contains("5 servos answer, at: 1, 2, 4, 6, 8"),
+        "{said}"
+    );
+    assert_eq!(person.machine().question(), Some(Question::Arm));
+
+    person.whole.robot.world_mut().servos().set_present(7, true);
+    person.until(Question::JointEnd);
+    person.said.clear();
+    for _ in 0..2 {
+        person.say(Answer::Yes);
+        person.wait(Duration::from_secs(3));
+    }
+    let said = person.said.join("; ");
+    assert!(said.contains("base: no servo moved"), "{said}");
+    let asked = person.machine().joint();
+    assert_eq!(asked, Some((Joint::Base, false)));
+    // What is asked again can be shown again.
+    person.asked = None;
+    person.until(Question::Poses);
 }
 
 #[test]
