@@ -24,11 +24,16 @@ use crate::setting::SettingKey;
 
 pub use kept::ArmValues;
 pub use rules::ArmProfileError;
-use rules::broken;
+use rules::{Rule, broken};
 pub use servos::{JointServos, LAST_SERVO_ID, NO_SERVO, OneOrTwo, REVERSED, ReversedJoints};
 
 /// The greatest position, load and torque of a servo.
 pub const SERVO_MAX: u16 = 1023;
+
+/// The torque limit of an arm that is limp: the board switches the torque of all its servos off, and
+/// on again where they are then. Only a trial has it, so that a person can move the joints by hand;
+/// no configuration may.
+pub const LIMP: u16 = 0;
 
 /// The positions to which a joint may go: 0 to 1023 of its (first) servo, counted as on the robot as
 /// drawn.
@@ -158,7 +163,7 @@ impl ArmProfile {
     /// How many values a board receives: all but the carry pose.
     pub const VALUES: usize = 32;
 
-    /// Checks that an arm can obey this profile.
+    /// Checks that an arm can obey this profile, and work.
     ///
     /// # Errors
     /// The first rule that the profile breaks.
@@ -170,7 +175,8 @@ impl ArmProfile {
         };
         for (profile, last_pose) in [(self, "drop"), (&carried, "carry")] {
             let values = profile.values();
-            if let Some(rule) = broken(&values) {
+            let limp = (profile.torque_limit == LIMP).then_some(Rule::LIMP);
+            if let Some(rule) = limp.or_else(|| broken(&values)) {
                 return Err(rule.told(&values, last_pose));
             }
         }

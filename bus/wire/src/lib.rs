@@ -36,7 +36,7 @@ mod text;
 
 pub use arm::{
     ArmLimits, ArmPose, ArmProfile, ArmProfileError, ArmValues, JointLimits, JointServos,
-    LAST_SERVO_ID, NO_SERVO, OneOrTwo, REVERSED, ReversedJoints, SERVO_MAX,
+    LAST_SERVO_ID, LIMP, NO_SERVO, OneOrTwo, REVERSED, ReversedJoints, SERVO_MAX,
 };
 pub use board::{ArmData, BoardStatus, servo};
 pub use bytes::PAYLOAD_LENGTH;

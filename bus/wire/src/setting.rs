@@ -24,7 +24,7 @@ coded! {
         /// Puts the arm's profile that was sent before in force. The value is the profile's check
         /// value ([`crate::Profile::check`]).
         ArmProfile = 15,
-        /// Torque limit of the arm's servos, 1 to 1023.
+        /// Torque limit of the arm's servos, 1 to 1023, or 0: they have no torque.
         ArmTorqueLimit = 16,
         /// Load that ends a squeeze, 1 to 1023.
         ArmSqueezeLoad = 17,

@@ -137,9 +137,15 @@ impl ServoBus {
         self.write(id, table::GOAL_POSITION_L, &values, board, now_us);
     }
 
-    /// Switches a servo's torque on.
-    pub(crate) fn switch_on(&mut self, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
-        self.write(id, table::TORQUE_ENABLE, &[1], board, now_us);
+    /// Switches a servo's torque on or off.
+    pub(crate) fn switch(
+        &mut self,
+        id: u8,
+        is_on: bool,
+        board: &mut impl SteeringBoard,
+        now_us: u32,
+    ) {
+        self.write(id, table::TORQUE_ENABLE, &[is_on.into()], board, now_us);
     }
 
     /// Takes in some of the servos' bytes. Returns the answer when the question has ended.

@@ -4,11 +4,11 @@ mod support;
 
 use lager_control::SteeringConfig;
 use lager_wire::{
-    ArmLimits, ArmPose, ArmProfile, Payload, Profile, Setting, SettingKey, SettingReply,
+    ArmLimits, ArmPose, ArmProfile, LIMP, Payload, Profile, Setting, SettingKey, SettingReply,
     SettingStatus,
 };
 use support::Bench;
-use support::arm::{done, refused};
+use support::arm::{aborted, arm_data, done, refused};
 use support::servos::Servos;
 
 const LEFT: u8 = 0xF7;
@@ -166,6 +166,74 @@ fn a_new_torque_limit_waits_for_nothing_and_an_order_waits_for_it() {
     for servo in &bench.pins.servos.servos {
         assert_eq!(servo.torque_limit, 500);
     }
+}
+
+#[test]
+fn a_limp_arm_has_no_torque_tells_where_it_is_and_holds_there_afterwards() {
+    let mut bench = Bench::ready();
+    let limp = ArmProfile {
+        torque_limit: LIMP,
+        ..ArmProfile::default()
+    };
+    tell_values(&mut bench, &limp);
+    let answer = put_in_force(&mut bench, &limp);
+    assert_eq!(answer, (check(&limp), SettingStatus::Accepted));
+    bench.run_ms(60);
+    assert!(!bench.pins.servos.servos.iter().any(|servo| servo.torque));
+    let goals = |bench: &Bench| -> usize {
+        let servos = &bench.pins.servos.servos;
+        servos.iter().map(|servo| servo.goals.len()).sum()
+    };
+    let before = goals(&bench);
+    // A person moves a joint, and the board says where it is.
+    bench.pins.servos.id(1).position = 700.0;
+    bench.pi.packets.clear();
+    bench.run_ms(2_000);
+    let told = arm_data(&bench);
+    assert!(
+        told.iter()
+            .any(|(_, data)| (data.servo, data.position) == (1, 700)),
+        "{told:?}"
+    );
+    for code in [LEFT, SQUEEZE, RELEASE, DROP] {
+        aborted(&mut bench, code, 50);
+    }
+    // A servo that was away for a moment comes back without torque.
+    bench.pins.servos.id(6).present = false;
+    bench.run_ms(1_000);
+    bench.pins.servos.id(6).present = true;
+    bench.run_ms(1_000);
+    assert!(!bench.pins.servos.servos.iter().any(|servo| servo.torque));
+    assert_eq!(goals(&bench), before, "no goal was written");
+
+    let strong = ArmProfile::default();
+    tell_values(&mut bench, &strong);
+    put_in_force(&mut bench, &strong);
+    bench.run_ms(100);
+    assert!(bench.pins.servos.servos.iter().all(|servo| servo.torque));
+    assert_eq!(bench.pins.servos.positions()[0], 700, "it stays there");
+    done(&mut bench, LEFT, 100);
+    assert_eq!(bench.pins.servos.positions()[0], 703);
+}
+
+#[test]
+fn a_movement_ends_when_the_arm_gets_limp() {
+    let mut bench = Bench::ready();
+    let limp = ArmProfile {
+        torque_limit: LIMP,
+        ..ArmProfile::default()
+    };
+    tell_values(&mut bench, &limp);
+    let seq = bench.command(DROP);
+    bench.run_ms(200);
+    put_in_force(&mut bench, &limp);
+    bench.run_ms(100);
+    let report = bench.report();
+    assert_eq!(report.finished_seq, seq);
+    assert!(report.flags.contains(lager_wire::SteerFlags::ABORTED));
+    let before = bench.pins.servos.positions();
+    bench.run_ms(1_000);
+    assert_eq!(bench.pins.servos.positions(), before);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use lager_emulator::chip::{Image, ImageError};
 use lager_emulator::measure::measure;
 use lager_emulator::rig::{Images, RigOptions};
 use lager_emulator::shell::{EmulatorConfig, run};
-use lager_plant::{Hand, Make, Warehouse, WorldState};
+use lager_plant::{Build, Hand, Make, Warehouse, WorldState};
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 /// The robot's two boards as chips: the real firmware images in simavr, wired to each other and
@@ -55,6 +55,9 @@ struct Cli {
     /// Seed of every imperfection of robot and world
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Seed of how the robot is built; without it, as drawn
+    #[arg(long, value_name = "SEED")]
+    built: Option<u64>,
     /// Baud rate of both lines; it must be that of the images
     #[arg(long, default_value_t = 500_000)]
     baud: u32,
@@ -113,6 +116,7 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
             Some(_) => Make::Varied,
             None => Make::Nominal,
         },
+        build: cli.built.map_or_else(Build::default, Build::drawn),
         baud: cli.baud,
     };
     let (Some(sensor_link), Some(steering_link), false) =

@@ -11,8 +11,13 @@
 //! | servos | ids 1 to 8 | other ids |
 //! | joints | each counts as drawn | any of them counts the other way |
 //! | shoulder, elbow | two servos that face each other | one servo |
+//! | horns | the middle of a servo is the joint's as drawn | up to 60 units of position beside it |
+//! | ends of the joints | those of the servos | nearer |
+//! | claw's servo | pushes with all its torque 32 units before its goal | 24 to 48 |
 //!
 //! A robot of another build drives only when its boards have been told of it.
+
+use lager_ax12::table::MAX_POSITION;
 
 use crate::arm::SERVOS;
 use crate::noise::Noise;
@@ -21,6 +26,24 @@ use crate::noise::Noise;
 const FULL_TURN: f64 = 12.0;
 /// The shortest and the longest full turn of another robot, in s.
 const FULL_TURNS: [f64; 2] = [10.0, 14.0];
+
+/// How far a blocked servo is from its goal when it pushes with all its torque, in units of position
+/// (compliance slope of the factory).
+pub(crate) const SLOPE: u16 = 32;
+/// The same of the claw's servo of another robot, at least and at most.
+const SLOPES: [u16; 2] = [24, 48];
+/// How far a horn can sit beside its place, in units of position.
+const MOST_OFF: u16 = 60;
+/// The ends of the joints of another robot, in the order of [`ArmBuild::JOINTS`]: the lower and the
+/// upper one, each at least and at most.
+const ENDS: [[[u16; 2]; 2]; 6] = [
+    [[150, 350], [700, 900]],
+    [[200, 285], [660, 800]],
+    [[200, 285], [600, 800]],
+    [[150, 350], [700, 900]],
+    [[150, 350], [700, 900]],
+    [[100, 150], [560, 700]],
+];
 
 /// The model of an IR ranger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +64,13 @@ pub struct ArmBuild {
     pub ids: [Option<u8>; SERVOS],
     /// Whether it counts the other way; both servos of a pair do or neither.
     pub reversed: [bool; SERVOS],
+    /// How much greater its position is than that of the arm as drawn, because its horn sits
+    /// otherwise. Of the second servo of a pair it is as much smaller.
+    pub offsets: [i16; SERVOS],
+    /// The positions, as drawn, beyond which the joint of each servo cannot go.
+    pub ends: [[u16; 2]; SERVOS],
+    /// How far from its goal the blocked claw's servo pushes with all its torque, in units.
+    pub slope: u16,
 }
 
 impl Default for ArmBuild {
@@ -48,6 +78,9 @@ impl Default for ArmBuild {
         Self {
             ids: core::array::from_fn(|index| Some(index as u8 + 1)),
             reversed: [false; SERVOS],
+            offsets: [0; SERVOS],
+            ends: [[0, MAX_POSITION]; SERVOS],
+            slope: SLOPE,
         }
     }
 }
@@ -154,6 +187,17 @@ impl ArmBuild {
                 arm.ids[first + 1] = None;
             }
         }
+        let mut draw = |[least, most]: [u16; 2]| least + noise.bits() as u16 % (most - least + 1);
+        for (joint, [lower, upper]) in Self::JOINTS.into_iter().zip(ENDS) {
+            arm.offsets[joint] = draw([0, 2 * MOST_OFF]).cast_signed() - MOST_OFF.cast_signed();
+            arm.ends[joint] = [draw(lower), draw(upper)];
+        }
+        for first in [1, 3] {
+            arm.offsets[first + 1] = -arm.offsets[first];
+            let [lower, upper] = arm.ends[first];
+            arm.ends[first + 1] = [MAX_POSITION - upper, MAX_POSITION - lower];
+        }
+        arm.slope = draw(SLOPES);
         arm
     }
 }
@@ -183,6 +227,10 @@ mod tests {
             |build| build.arm.reversed[5],
             |build| build.arm.reversed[6],
             |build| build.arm.reversed[7],
+            |build| build.arm.offsets[0] > 0,
+            |build| build.arm.offsets[1] > 0,
+            |build| build.arm.offsets[7] > 0,
+            |build| build.arm.slope > SLOPES[0].midpoint(SLOPES[1]),
         ] {
             let count = builds.iter().filter(|build| differs(build)).count();
             assert!((30..70).contains(&count), "{count}");

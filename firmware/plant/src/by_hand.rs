@@ -3,6 +3,7 @@
 use lager_floor::Edge;
 use serde::{Deserialize, Serialize};
 
+use crate::arm::SERVOS;
 use crate::body::Pose;
 use crate::obstacles::HandsOff;
 use crate::world::{Snapshot, World};
@@ -19,6 +20,11 @@ pub enum Hand {
     Hold(u8),
     /// Puts the robot down so many mm to the left of where it stands.
     Shift(i16),
+    /// Brings a joint of the arm, by its first servo's number - 1, to this position as drawn and
+    /// holds it there, as far as it goes; it stays where its servos hold it.
+    Bring(u8, u16),
+    /// Holds a piece of goods between the jaws, or takes it away.
+    Fill(bool),
     /// Puts a thing on this edge.
     Put(Edge),
     /// Takes the thing on this edge away.
@@ -48,6 +54,17 @@ impl Hand {
                 let pose = world.pose();
                 let (x, y) = pose.point(0.0, left.into());
                 world.place(Pose { x, y, ..pose });
+                Ok(())
+            }
+            Self::Bring(joint, position) => {
+                if usize::from(joint) < SERVOS {
+                    let servos = world.servos();
+                    servos.bring(joint.into(), f64::from(position));
+                }
+                Ok(())
+            }
+            Self::Fill(is_there) => {
+                world.fill_claw(is_there);
                 Ok(())
             }
             Self::Put(edge) => world.put_obstacle(edge),

@@ -14,7 +14,7 @@ use crate::battery::Battery;
 use crate::body::Pose;
 use crate::build::Build;
 use crate::contact::Contact;
-use crate::goods::{Good, Goods};
+use crate::goods::{self, Good, Goods};
 use crate::ir::IrRanger;
 use crate::line::LineSensor;
 use crate::make::Make;
@@ -85,6 +85,8 @@ pub struct World {
     build: Build,
     /// Somebody holds the robot above the floor, so its wheels turn and it stays.
     lifted: bool,
+    /// A person holds goods between the jaws.
+    is_filled: bool,
     /// What an input shows that hangs at nothing.
     floating: Noise,
     tape: Tape,
@@ -142,6 +144,7 @@ impl World {
         Ok(Self {
             build: Build::default(),
             lifted: false,
+            is_filled: false,
             floating: noise(stream::INPUT),
             tape,
             blocks,
@@ -306,6 +309,11 @@ impl World {
         self.ir.hold(Some(millimetres));
     }
 
+    /// Holds a piece of goods between the jaws, or takes it away.
+    pub fn fill_claw(&mut self, is_there: bool) {
+        self.is_filled = is_there;
+    }
+
     /// Puts the robot at a pose, at rest, with nothing held in front of it.
     pub fn place(&mut self, pose: Pose) {
         self.lifted = false;
@@ -381,8 +389,11 @@ impl World {
                 self.touch(seconds * SELDOM as f64);
             }
         }
-        self.servos
-            .step(seconds, arm::claw_position(self.goods.narrowest()));
+        let between = match self.is_filled {
+            true => goods::SIDE,
+            false => self.goods.narrowest(),
+        };
+        self.servos.step(seconds, arm::claw_position(between));
         self.move_claw();
         let claw = self.claw();
         self.goods.step(seconds, &self.pose, &claw, &self.tape);

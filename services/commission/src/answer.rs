@@ -25,6 +25,8 @@ pub enum Answer {
     Number(f32),
     /// The ways of the left and the right wheels.
     Ways([Way; 2]),
+    /// The person holds the button: the joint moves on for a moment.
+    Hold,
     /// This step from its beginning, with what held before it.
     Again,
     /// The step before, with what held before that.
@@ -58,7 +60,9 @@ impl Answer {
             }
         }
         match takes {
-            Takes::Yes => Err(unfit()),
+            // An empty line comes again and again while a person holds the enter key.
+            Takes::Hold if line.is_empty() => Ok(Self::Hold),
+            Takes::Yes | Takes::Hold => Err(unfit()),
             Takes::Number => number(&line).map(Self::Number).ok_or_else(unfit),
             Takes::Ways => {
                 let mut letters = line.chars().map(|letter| match letter {
@@ -114,5 +118,10 @@ mod tests {
             assert!(ways(wrong).is_err(), "{wrong}");
         }
         assert!(Answer::read("12", Takes::Yes).is_err());
+        assert_eq!(Answer::read("", Takes::Hold), Ok(Answer::Hold));
+        assert_eq!(Answer::read("ja", Takes::Hold), Ok(Answer::Yes));
+        for wrong in ["", "hold"] {
+            assert!(Answer::read(wrong, Takes::Yes).is_err());
+        }
     }
 }

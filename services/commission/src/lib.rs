@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 mod answer;
+mod arm;
 mod line;
 mod machine;
 mod range;
@@ -23,6 +24,7 @@ mod wheels;
 mod words;
 
 pub use answer::{Answer, Way};
+pub use arm::Joint;
 pub use machine::{Built, Commissioning, Effect};
 pub use step::{Question, Step, Takes};
 pub use words::{Said, sentences};

@@ -9,15 +9,18 @@
 //!     '────────────────────> the wheels turn ────┘
 //! ```
 //!
+//! Of the arm, `machine/arm.rs` draws what is beside this.
+//!
 //! In every state a failure ends the step: the robot stands, what held before the step holds again,
 //! and the step begins anew with a sentence that says why.
 
 mod answers;
+mod arm;
 mod shown;
 
 use core::time::Duration;
 
-use lager_operator::{Driving, For, Ids, Seen};
+use lager_operator::{Driving, For, Ids};
 use lager_orders::{Moment, Reason};
 use lager_topics::{
     Calibration, Health, Outcome, Part, ProfileState, SteeringOrder, SteeringReport,
@@ -27,7 +30,7 @@ use lager_wire::{Centimetres, LineBits, OperatorCommand, RobotProfile};
 use crate::answer::{Answer, Way};
 use crate::range::{MEASURING, Point};
 use crate::recent::Recent;
-use crate::step::{Question, Step};
+use crate::step::{Question, Step, Takes};
 use crate::words::Said;
 use crate::{line, range, wheels};
 
@@ -46,7 +49,7 @@ const LONGEST: Duration = Duration::from_secs(60);
 /// Without a new `link/health` for this long, nobody knows how the boards are.
 const UNHEARD: Duration = Duration::from_secs(2);
 /// The parts of the description that are found out.
-const TOLD: [Part; 2] = [Part::Steering, Part::Sensors];
+const TOLD: [Part; 3] = Part::ALL;
 
 /// How a robot is built, as far as commissioning finds it out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +58,10 @@ pub struct Built {
     pub robot: RobotProfile,
     /// The speed with both motors at their duty, in mm/s.
     pub cruise_mm_per_s: f32,
+    /// The positions of shoulder and elbow when the claw is around goods in front of the robot.
+    pub reach_shoulder: u16,
+    /// Of the elbow.
+    pub reach_elbow: u16,
 }
 
 /// Something that the caller must do.
@@ -88,6 +95,11 @@ enum State {
         begun: Option<Duration>,
         is_pulse: bool,
     },
+    /// The servos are listened to, since a time or from the next turn on.
+    Listens { since: Option<Duration> },
+    /// A joint or the claw moves, because a person holds the button, until a time. Spent: it has
+    /// moved, and waits for the next press.
+    Holds { until: Duration, is_spent: bool },
     /// Everything is said.
     Over,
 }
@@ -123,6 +135,9 @@ pub struct Commissioning {
     /// The person ends it, and the boards are told what they were told before.
     is_leaving: bool,
     found: Found,
+    arm: arm::Work,
+    /// What is told now is told to listen to the servos afterwards.
+    listens: bool,
     health: Option<(Duration, Health)>,
     /// The lives of both links since the step began.
     epochs: Option<[u32; 2]>,
@@ -152,6 +167,8 @@ impl Commissioning {
             description: None,
             is_leaving: false,
             found: Found::default(),
+            arm: arm::Work::default(),
+            listens: false,
             health: None,
             epochs: None,
             report: None,
@@ -174,6 +191,7 @@ impl Commissioning {
     pub fn question(&self) -> Option<Question> {
         match self.state {
             State::Asks
+            | State::Holds { .. }
             | State::Moves {
                 is_pulse: false, ..
             } => Some(self.question),
@@ -318,6 +336,17 @@ impl Commissioning {
                 since,
                 due: Some(due),
             } if due <= now.robot => self.tell_next(since),
+            State::Listens { since: None } => {
+                self.state = State::Listens {
+                    since: Some(now.robot),
+                };
+            }
+            State::Listens { since: Some(since) } if past(since, self.listening()) => {
+                if let Err(why) = self.listened(now) {
+                    self.fail(now, why);
+                }
+            }
+            State::Holds { .. } => self.go_on(now),
             State::Calibrates { since, .. } if past(since, CALIBRATE) => {
                 self.fail(now, Reason::from(lager_orders::Code::CalibrationSilent));
             }
@@ -353,7 +382,17 @@ impl Commissioning {
             (Answer::Again, _) => self.enter(now, self.step),
             (Answer::Skip, _) => self.enter_unchanged(now, self.step.next()),
             (Answer::Back, _) => self.enter(now, self.step.before()),
-            (_, State::Asks) => {
+            (Answer::Hold, State::Asks | State::Holds { .. }) => {
+                if self.question.takes() == Takes::Hold {
+                    self.hold(now);
+                }
+            }
+            (Answer::Hold, _) => {}
+            (Answer::No, State::Holds { .. }) if self.moves() => self.fail(now, "broken_off"),
+            (_, State::Asks | State::Holds { .. }) => {
+                if self.state != State::Asks {
+                    self.let_go(now);
+                }
                 if let Err(why) = self.answered(now, answer) {
                     self.fail(now, why);
                 }
@@ -373,7 +412,9 @@ impl Commissioning {
             }
             // Whatever a person types while the robot moves, he wants it to stand.
             (_, State::Moves { .. }) => self.fail(now, "broken_off"),
-            (_, State::Tells { .. } | State::Calibrates { .. }) => self.said.push("wait".into()),
+            (_, State::Tells { .. } | State::Calibrates { .. } | State::Listens { .. }) => {
+                self.said.push("wait".into());
+            }
         }
     }
 
@@ -387,6 +428,11 @@ impl Commissioning {
         if self.told != [None; TOLD.len()] {
             self.tell(now, self.built.robot);
         }
+    }
+
+    /// The arm that the steering board obeys.
+    fn told_arm(&self) -> Option<lager_wire::ArmProfile> {
+        self.told[Part::Arm as usize].map(|told| told.arm)
     }
 
     /// `link/health`, if it is new.
@@ -423,6 +469,7 @@ impl Commissioning {
         self.stand(now);
         self.step = step;
         self.found = Found::default();
+        (self.arm, self.listens) = (arm::Work::default(), false);
         self.epochs = None;
         self.built = self.before[step as usize];
         self.ask(step.first());
@@ -434,7 +481,7 @@ impl Commissioning {
             Step::Distance => trial.sensors.ranger = MEASURING,
             Step::Wheels => trial.steering.wheels = wheels::plain(trial.steering.wheels),
             Step::Battery => trial.steering.divider = true,
-            _ => {}
+            _ => trial.arm = self.arm_trial(step),
         }
         self.tell(now, trial);
     }
@@ -459,7 +506,8 @@ impl Commissioning {
         let is_open = |part: &Part| match (part, self.told[*part as usize]) {
             (_, None) => true,
             (Part::Steering, Some(told)) => told.steering != self.wanted.steering,
-            (_, Some(told)) => told.sensors != self.wanted.sensors,
+            (Part::Arm, Some(told)) => told.arm != self.wanted.arm,
+            (Part::Sensors, Some(told)) => told.sensors != self.wanted.sensors,
         };
         if let Some(part) = TOLD.into_iter().find(is_open) {
             self.under_way = Some(self.wanted);
@@ -471,10 +519,11 @@ impl Commissioning {
         self.bits.clear();
         self.readings.clear();
         self.volts.clear();
-        self.state = if self.is_leaving {
-            State::Over
-        } else {
-            State::Asks
+        let listens = core::mem::take(&mut self.listens);
+        self.state = match (self.is_leaving, listens) {
+            (true, _) => State::Over,
+            (false, true) => State::Listens { since: None },
+            (false, false) => State::Asks,
         };
     }
 
@@ -507,13 +556,7 @@ impl Commissioning {
     }
 
     fn begin(&mut self, now: Moment, command: OperatorCommand, is_pulse: bool) -> Result<(), Said> {
-        let health = self.known(now.robot).ok_or("bridge_silent")?;
-        let seen = Seen {
-            health: Some(*health),
-            ..Seen::default()
-        };
-        seen.may_move(command)?;
-        self.steer(now, command);
+        self.order(now, command)?;
         self.state = State::Moves {
             since: now.robot,
             begun: None,

@@ -1,7 +1,8 @@
 //! [`Step`] and [`Question`]: what is found out, one after the other.
 //!
 //! Each step rests on those before it: the line is followed by sensors that are known, and times are
-//! taken when the motors are known and the battery does not change the speed.
+//! taken when the motors are known and the battery does not change the speed. Of the arm, a person's
+//! hand shows everything before a servo moves.
 
 use lager_orders::Language;
 
@@ -24,13 +25,21 @@ pub enum Step {
     Turn,
     /// How fast the robot drives.
     Speed,
+    /// Which servos move the arm's joints, which way they count, and how far they may go.
+    Arm,
+    /// The arm's poses.
+    Poses,
+    /// Whether each joint goes the right way by itself.
+    Joints,
+    /// How far the claw closes, and how hard.
+    Claw,
     /// Whether it is saved.
     Finish,
 }
 
 impl Step {
     /// All steps, in their order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 12] = [
         Self::Boards,
         Self::Line,
         Self::Distance,
@@ -38,6 +47,10 @@ impl Step {
         Self::Battery,
         Self::Turn,
         Self::Speed,
+        Self::Arm,
+        Self::Poses,
+        Self::Joints,
+        Self::Claw,
         Self::Finish,
     ];
 
@@ -51,6 +64,10 @@ impl Step {
             Self::Battery => Question::Battery,
             Self::Turn => Question::Turn,
             Self::Speed => Question::Speed,
+            Self::Arm => Question::Arm,
+            Self::Poses => Question::Poses,
+            Self::Joints => Question::JointMoves,
+            Self::Claw => Question::ClawEmpty,
             Self::Finish => Question::Finish,
         }
     }
@@ -75,6 +92,8 @@ pub enum Takes {
     Number,
     /// The ways of the left and the right wheels.
     Ways,
+    /// The person holds the button, again and again, and then yes or no.
+    Hold,
 }
 
 /// What a person is asked.
@@ -99,12 +118,22 @@ pub enum Question {
     TurnRound,
     Speed,
     SpeedThere,
+    Arm,
+    JointEnd,
+    Poses,
+    PoseReach,
+    PoseCarry,
+    PoseDrop,
+    PoseNeutral,
+    JointMoves,
+    ClawEmpty,
+    ClawFull,
     Finish,
 }
 
 impl Question {
     /// All questions, in their order.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 26] = [
         Self::Boards,
         Self::LineSway,
         Self::LineFloor,
@@ -120,6 +149,16 @@ impl Question {
         Self::TurnRound,
         Self::Speed,
         Self::SpeedThere,
+        Self::Arm,
+        Self::JointEnd,
+        Self::Poses,
+        Self::PoseReach,
+        Self::PoseCarry,
+        Self::PoseDrop,
+        Self::PoseNeutral,
+        Self::JointMoves,
+        Self::ClawEmpty,
+        Self::ClawFull,
         Self::Finish,
     ];
 
@@ -145,6 +184,16 @@ impl Question {
             Self::TurnRound => "ask_turn_round",
             Self::Speed => "ask_speed",
             Self::SpeedThere => "ask_speed_there",
+            Self::Arm => "ask_arm",
+            Self::JointEnd => "ask_joint_end",
+            Self::Poses => "ask_poses",
+            Self::PoseReach => "ask_pose_reach",
+            Self::PoseCarry => "ask_pose_carry",
+            Self::PoseDrop => "ask_pose_drop",
+            Self::PoseNeutral => "ask_pose_neutral",
+            Self::JointMoves => "ask_joint_moves",
+            Self::ClawEmpty => "ask_claw_empty",
+            Self::ClawFull => "ask_claw_full",
             Self::Finish => "ask_finish",
         }
     }
@@ -154,6 +203,7 @@ impl Question {
         match self {
             Self::RangeFar | Self::RangeNear | Self::Battery | Self::Speed => Takes::Number,
             Self::SawAhead | Self::SawLeft => Takes::Ways,
+            Self::JointMoves | Self::ClawEmpty | Self::ClawFull => Takes::Hold,
             _ => Takes::Yes,
         }
     }

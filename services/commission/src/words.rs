@@ -110,6 +110,8 @@ mod tests {
             include_str!("range.rs"),
             include_str!("wheels.rs"),
             include_str!("answer.rs"),
+            include_str!("arm.rs"),
+            include_str!("machine/arm.rs"),
         ];
         let mut names = BTreeSet::new();
         for sentence in sentences() {

@@ -146,7 +146,8 @@ impl Bench {
             // What was typed before its question was asked counts for nothing.
             if let [first, rest @ ..] = &typed.lines[..] {
                 is_leaving |= self.typed(first, is_leaving);
-                if !rest.is_empty() {
+                // A key that is held gives many empty lines.
+                if rest.iter().any(|line| !line.trim().is_empty()) {
                     self.page.owe("wait".into());
                 }
             }
@@ -172,16 +173,19 @@ impl Bench {
     /// A line of the person. Returns whether it ends everything.
     fn typed(&mut self, line: &str, is_leaving: bool) -> bool {
         let now = self.now();
-        self.page.typed();
         let line = line.trim();
-        if is_leaving || line.is_empty() {
+        let takes = self.machine.question().map_or(Takes::Yes, Question::takes);
+        let is_held = takes == Takes::Hold && line.is_empty();
+        if !is_held {
+            self.page.typed();
+        }
+        if is_leaving || (line.is_empty() && !is_held) {
             return false;
         }
         if ["quit", "q", "exit", "sluta"].contains(&line.to_lowercase().as_str()) {
             self.machine.quit(now);
             return true;
         }
-        let takes = self.machine.question().map_or(Takes::Yes, Question::takes);
         match Answer::read(line, takes) {
             Ok(answer) => self.machine.answer(now, answer),
             // Whatever a person types while the robot moves, he wants it to stand.

@@ -215,9 +215,6 @@ impl Config {
             );
         }
         self.serial.validate()?;
-        if self.simulator.built.is_some() && self.body == Body::Chip {
-            bail!("[simulator] built is of a simulated robot, and body is \"chip\"; leave one out");
-        }
         if self.simulator.obstacles as usize > MOST_OBSTACLES {
             bail!(
                 "[simulator] obstacles is {}; at most {MOST_OBSTACLES} things can stand in a warehouse",

@@ -110,6 +110,9 @@ impl Emulator {
         if let Some(clock) = &config.chip.clock {
             command.arg("--clock").arg(clock);
         }
+        if let Some(built) = config.simulator.built {
+            command.args(["--built", &built.to_string()]);
+        }
         if let Some(folder) = &config.chip.eeprom {
             command.arg("--eeprom").arg(folder);
         }

@@ -28,6 +28,8 @@ pub fn wish(warehouse: &Warehouse, ask: &WorldAsk) -> Result<Hand, WorldAnswer> 
             WorldAskKind::Take => edge(warehouse, at).map(Hand::Take),
             WorldAskKind::Lift => Some(Hand::Lift),
             WorldAskKind::Hold => Some(Hand::Hold(ask.x)),
+            WorldAskKind::Bring => Some(Hand::Bring(ask.x, u16::from(ask.y) * 4)),
+            WorldAskKind::Fill => Some(Hand::Fill(ask.x != 0)),
             WorldAskKind::Shift => Some(Hand::Shift(i16::from(ask.x) - 128)),
         }
     };

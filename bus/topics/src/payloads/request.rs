@@ -187,6 +187,11 @@ coded! {
         Hold = 4,
         /// Put the robot down `x` - 128 mm to the left of where it stands.
         Shift = 5,
+        /// Bring the joint of the arm whose first servo is number `x` + 1 to position 4 * `y`, as far
+        /// as it goes, and hold it until its servos do.
+        Bring = 6,
+        /// Hold a piece of goods between the jaws (`x` = 1), or take it away (`x` = 0).
+        Fill = 7,
     }
 }
 

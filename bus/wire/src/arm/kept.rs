@@ -19,6 +19,12 @@ impl ArmValues {
         self.0[0]
     }
 
+    /// Whether the servos have no torque ([`super::LIMP`]).
+    #[must_use]
+    pub const fn is_limp(&self) -> bool {
+        self.torque_limit() == super::LIMP
+    }
+
     /// The load that ends a squeeze.
     #[must_use]
     pub const fn squeeze_load(&self) -> u16 {
@@ -73,10 +79,11 @@ impl ArmValues {
         self.0[24 + servo] & REVERSED != 0
     }
 
-    /// Whether another profile has the same servos, which count the same way.
+    /// Whether another profile has the same servos, which count the same way, and both are limp or
+    /// neither is.
     #[must_use]
     pub fn has_servos_of(&self, other: &Self) -> bool {
-        self.0[24..] == other.0[24..]
+        self.0[24..] == other.0[24..] && self.is_limp() == other.is_limp()
     }
 }
 

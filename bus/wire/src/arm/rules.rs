@@ -6,7 +6,7 @@
 use core::fmt;
 
 use super::servos::{LAST_SERVO_ID, NO_SERVO, PLACES, REVERSED};
-use super::{ArmLimits, ArmProfile, SERVO_MAX, limits};
+use super::{ArmLimits, ArmProfile, LIMP, SERVO_MAX, limits};
 
 /// Why a profile is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,12 +171,13 @@ impl ArmProfile {
 /// The first rule that values break.
 pub(super) fn broken(values: &[u16; ArmProfile::VALUES]) -> Option<Rule> {
     let at = |place: u8| values.get(usize::from(place)).copied().unwrap_or(0);
-    for place in [TORQUE, SQUEEZE] {
-        if at(place) == 0 || at(place) > SERVO_MAX {
-            return Some(Rule::Strength(place));
-        }
+    if at(TORQUE) > SERVO_MAX {
+        return Some(Rule::Strength(TORQUE));
     }
-    if at(SQUEEZE) > at(TORQUE) {
+    if at(SQUEEZE) == 0 || at(SQUEEZE) > SERVO_MAX {
+        return Some(Rule::Strength(SQUEEZE));
+    }
+    if at(TORQUE) != LIMP && at(SQUEEZE) > at(TORQUE) {
         return Some(Rule::Squeeze);
     }
     let mut place = FIRST_LIMITS;
@@ -227,6 +228,9 @@ pub(super) fn broken(values: &[u16; ArmProfile::VALUES]) -> Option<Rule> {
 }
 
 impl Rule {
+    /// A torque of 0, which no configuration may have.
+    pub(super) const LIMP: Self = Self::Strength(TORQUE);
+
     /// The rule in words; `last_pose` is the name of the pose in the drop's place.
     pub(super) fn told(
         self,

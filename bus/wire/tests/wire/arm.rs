@@ -1,6 +1,6 @@
 //! The arm's profile: its rules, and how its values travel.
 
-use lager_wire::{ArmLimits, ArmProfile, NO_SERVO, OneOrTwo, Profile, SettingKey};
+use lager_wire::{ArmLimits, ArmProfile, LIMP, NO_SERVO, OneOrTwo, Profile, SERVO_MAX, SettingKey};
 
 use crate::sample::Noise;
 
@@ -116,6 +116,20 @@ fn an_arm_has_other_ids_single_servos_and_reversed_joints() {
 }
 
 #[test]
+fn a_limp_arm_is_for_a_board_and_for_no_configuration() {
+    let mut profile = ArmProfile {
+        torque_limit: LIMP,
+        ..ArmProfile::default()
+    };
+    assert!(ArmProfile::is_sound(&profile.values()));
+    let error = profile.validate().expect_err("no torque").to_string();
+    assert!(error.contains("torque_limit is 0"), "{error}");
+    // What it must not do later, it must not be told now.
+    profile.squeeze_load = SERVO_MAX + 1;
+    assert!(!ArmProfile::is_sound(&profile.values()));
+}
+
+#[test]
 fn a_pair_of_which_one_servo_counts_the_other_way_is_no_pair() {
     for (index, value) in [(26, 259), (28, 261), (24, NO_SERVO), (31, 1_032)] {
         let mut values = ArmProfile::default().values();
@@ -136,7 +150,15 @@ fn board_and_configuration_judge_alike() {
         }
         // Some values of a servo stand in no configuration.
         let profile = ArmProfile::from_values(&values);
-        let judged = profile.values() == values && profile.validate().is_ok();
+        // A limp arm is only tried, and no configuration has one.
+        let strong = ArmProfile {
+            torque_limit: match profile.torque_limit {
+                LIMP => SERVO_MAX,
+                limit => limit,
+            },
+            ..profile
+        };
+        let judged = profile.values() == values && strong.validate().is_ok();
         assert_eq!(ArmProfile::is_sound(&values), judged, "{values:?}");
         sound += u32::from(judged);
     }

@@ -22,9 +22,13 @@
 //! ```text
 //!              answers             goal = position         torque on
 //!   unseen ---------------> seen -----------------> held ------------> ready
+//!      |                     '-- the arm is limp: torque off --> limp    |
 //!   missing <----------- no answer, twice, wherever it happens ---------'
 //!      '-- answers ------^
 //! ```
+//!
+//! A limp arm has no torque, so that a person can move it; its commands fail. When it is not limp any
+//! more, all servos are brought into service where they are then.
 //!
 //! A missing servo never delays the others: the board flags it, leaves it out and asks it again in
 //! its turn.
@@ -76,13 +80,13 @@ pub enum Start {
 enum Job {
     Look(usize),
     Goal { index: usize, speed: u16 },
-    SwitchOn(usize),
+    Switch(usize),
 }
 
 impl Job {
     const fn index(self) -> usize {
         match self {
-            Self::Look(index) | Self::Goal { index, .. } | Self::SwitchOn(index) => index,
+            Self::Look(index) | Self::Goal { index, .. } | Self::Switch(index) => index,
         }
     }
 }
@@ -157,8 +161,8 @@ impl Arm {
 
     /// Puts another profile in force; the caller has validated it. A moving servo goes on to its
     /// old goal. Servos in service get the new torque limit without being moved. If the profile
-    /// names other servos or directions, the command under way is broken off, and every servo is
-    /// brought into service where it is.
+    /// names other servos or directions, or makes the arm limp or ends that, the command under way is
+    /// broken off, and every servo is brought into service where it is.
     pub fn set_profile(&mut self, profile: ArmValues) {
         let before = core::mem::replace(&mut self.config.profile, profile);
         self.torque_untold |= profile.torque_limit() != before.torque_limit();
@@ -300,12 +304,12 @@ impl Arm {
             .enumerate()
             .find_map(|(index, servo)| match servo.setup {
                 Setup::Unseen => self.profile().has(index).then_some(Job::Look(index)),
-                Setup::Seen => Some(Job::Goal {
+                Setup::Seen if !self.profile().is_limp() => Some(Job::Goal {
                     index,
                     speed: self.config.sequence_speed,
                 }),
-                Setup::Held => Some(Job::SwitchOn(index)),
-                Setup::Ready | Setup::Missing => None,
+                Setup::Seen | Setup::Held => Some(Job::Switch(index)),
+                Setup::Ready | Setup::Limp | Setup::Missing => None,
             })
     }
 
@@ -343,7 +347,7 @@ impl Arm {
                 let values = (goal, speed, profile.torque_limit());
                 self.bus.set_goal(id, values, board, now_us);
             }
-            Job::SwitchOn(_) => self.bus.switch_on(id, board, now_us),
+            Job::Switch(_) => self.bus.switch(id, !profile.is_limp(), board, now_us),
         }
     }
 
@@ -353,6 +357,7 @@ impl Arm {
             .union(ErrorBits::INSTRUCTION)
             .union(ErrorBits::RANGE);
         let is_reversed = self.profile().is_reversed(job.index());
+        let is_limp = self.profile().is_limp();
         let servo = &mut self.servos[job.index()];
         let ServoAnswer::Status { errors, look } = answer else {
             servo.setup = Setup::Missing;
@@ -375,7 +380,8 @@ impl Arm {
             (Job::Goal { .. }, _) if servo.setup == Setup::Seen => {
                 servo.setup = if done { Setup::Held } else { Setup::Missing };
             }
-            (Job::SwitchOn(_), _) => {
+            (Job::Switch(_), _) if is_limp && done => servo.setup = Setup::Limp,
+            (Job::Switch(_), _) => {
                 servo.setup = if done { Setup::Ready } else { Setup::Missing };
             }
             (Job::Goal { .. }, _) => {}

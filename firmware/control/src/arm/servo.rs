@@ -13,6 +13,7 @@ pub(super) enum Setup {
     Seen,
     Held,
     Ready,
+    Limp,
 }
 
 /// A servo that comes back keeps a goal this near to its position, and steps start from it. A goal

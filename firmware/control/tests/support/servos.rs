@@ -199,8 +199,9 @@ impl Servo {
                 registers[10] = u8::from(self.is_moving());
                 registers
             }
-            Instruction::Write if parameters == [table::TORQUE_ENABLE, 1] => {
-                self.torque = true;
+            Instruction::Write if parameters.len() == 2 => {
+                assert_eq!(parameters[0], table::TORQUE_ENABLE);
+                self.torque = parameters[1] == 1;
                 Vec::new()
             }
             Instruction::Write => {

@@ -24,7 +24,7 @@ use std::rc::Rc;
 use lager_pins::{sensor as at_sensor, steering as at_steering};
 use lager_plant::arm::RESTING;
 use lager_plant::noise::{Noise, START_STREAM};
-use lager_plant::{Make, Snapshot, Warehouse, WarehouseError, World, WorldState};
+use lager_plant::{Build, Make, Snapshot, Warehouse, WarehouseError, World, WorldState};
 use thiserror::Error;
 
 use crate::chip::{Chip, FREQUENCY, Image, ImageError, ResetLine, Wire, wire};
@@ -81,6 +81,8 @@ pub struct RigOptions {
     pub seed: u64,
     /// The kind of imperfections.
     pub make: Make,
+    /// How the robot is built. Its boards do not know that unless they are told.
+    pub build: Build,
     /// Baud rate of the Pi's ends of both lines.
     pub baud: u32,
 }
@@ -158,7 +160,7 @@ impl Rig {
         let mut delay = || spread.bits() % START_SPREAD;
         let sensor = Chip::new(&images.sensor, delay(), options.seed)?;
         let steering = Chip::new(&images.steering, delay(), !options.seed)?;
-        let world = World::new(&options.warehouse, options.seed, options.make, RESTING)?;
+        let world = World::new(&options.warehouse, options.seed, options.make, RESTING)?.built(options.build);
         let world = Rc::new(RefCell::new(world));
         let epoch = Rc::new(Epoch::default());
         let inputs = boards::connect_inputs(&sensor, &world, &epoch);

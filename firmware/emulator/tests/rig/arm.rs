@@ -7,7 +7,7 @@ use lager_emulator::chip::UsartId;
 use lager_emulator::rig::Board;
 use lager_plant::{ArmBuild, ServoFault};
 use lager_wire::{
-    ArmCommand, ArmProfile, Command, OneOrTwo, Payload, Profile, Setting, SettingKey,
+    ArmCommand, ArmProfile, Command, LIMP, OneOrTwo, Payload, Profile, Setting, SettingKey,
     SettingStatus, SteerFlags, WheelCommand,
 };
 
@@ -393,4 +393,36 @@ fn an_arm_that_is_built_otherwise_moves_as_it_is_described() {
     let flags = carry_out(&mut robot, ArmCommand::Squeeze);
     assert!(!flags.contains(SteerFlags::ABORTED));
     assert!(positions(&mut robot)[7] < 215.0, "closed on nothing");
+}
+
+/// What a limp arm's servos are told, checked by hand against the AX-12's manual: torque enable 0.
+#[test]
+fn a_limp_arms_torque_is_off_and_it_holds_afterwards_where_a_hand_has_brought_it() {
+    let mut robot = ready(24);
+    let limp = ArmProfile {
+        torque_limit: LIMP,
+        ..ArmProfile::default()
+    };
+    robot.rig.servo_wire().record();
+    tell(&mut robot, &limp);
+    robot.run(Duration::from_millis(100));
+    let told = written(&writes(&robot));
+    let off: Vec<_> = (1..=8_u8)
+        .map(|id| {
+            let sum = !(id + 4 + 3 + 0x18);
+            format!("FF FF {id:02X} 04 03 18 00 {sum:02X}")
+        })
+        .collect();
+    assert_eq!(off[0], "FF FF 01 04 03 18 00 DF");
+    assert_eq!(told, off);
+    robot.rig.world_mut().servos().bring(0, 700.0);
+    let flags = carry_out(&mut robot, ArmCommand::Left);
+    assert!(flags.contains(SteerFlags::ABORTED), "it has no torque");
+    tell(&mut robot, &ArmProfile::default());
+    robot.run(Duration::from_millis(500));
+    let base = |robot: &mut Robot| robot.rig.world_mut().servos().positions()[0];
+    assert_eq!(base(&mut robot), 700.0);
+    let flags = carry_out(&mut robot, ArmCommand::Left);
+    assert!(!flags.contains(SteerFlags::ABORTED));
+    assert_eq!(base(&mut robot), 703.0);
 }

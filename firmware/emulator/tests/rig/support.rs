@@ -7,7 +7,7 @@ use std::time::Duration;
 use lager_emulator::chip::{FREQUENCY, Image};
 use lager_emulator::pi::{self, Pi};
 use lager_emulator::rig::{Board, Images, Rig, RigOptions};
-use lager_plant::{Make, Pose, Warehouse};
+use lager_plant::{Build, Make, Pose, Warehouse};
 use lager_wire::{BoardStatus, Command, Payload, SteerData, WheelCommand};
 
 /// The default baud rate of the Pi's lines, and the original robot's.
@@ -47,6 +47,7 @@ fn options(seed: u64, baud: u32) -> RigOptions {
         warehouse: Warehouse::builtin("small").expect("it is built in"),
         seed,
         make: Make::Nominal,
+        build: Build::default(),
         baud,
     }
 }

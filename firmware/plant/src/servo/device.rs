@@ -11,12 +11,13 @@ use lager_ax12::table::{
 };
 use lager_ax12::{ErrorBits, Instruction};
 
+use crate::arm::SERVOS;
+use crate::build::{ArmBuild, SLOPE};
+
 /// Units of position a second at full speed: 59 rpm, 1023 units in 300 degrees.
 const FULL_SPEED_UNITS: f64 = 59.0 * 6.0 * 1023.0 / 300.0;
 /// Units of position a second for each unit of goal speed (0.111 rpm).
 const SPEED_UNIT: f64 = 0.111 * 6.0 * 1023.0 / 300.0;
-/// A blocked servo this far from its goal pushes with all its torque, in units (compliance slope).
-const SLOPE: f64 = 32.0;
 
 /// One servo.
 #[derive(Clone, Debug)]
@@ -25,6 +26,14 @@ pub(super) struct Servo {
     registered: Option<(u8, Vec<u8>)>,
     /// It counts the other way: its table has 1023 minus the position.
     is_reversed: bool,
+    /// How much greater its position is than the joint's as drawn.
+    offset: f64,
+    /// Where the joint ends.
+    ends: [f64; 2],
+    /// A blocked servo this far from its goal pushes with all its torque, in units.
+    slope: f64,
+    /// A person holds the joint.
+    pub(super) is_held: bool,
     pub(super) position: f64,
     /// The lowest position that the joint can reach now, because something is in the way.
     pub(super) stop: f64,
@@ -46,6 +55,10 @@ impl Servo {
             table: [0; LENGTH],
             registered: None,
             is_reversed: false,
+            offset: 0.0,
+            ends: [0.0, f64::from(MAX_POSITION)],
+            slope: f64::from(SLOPE),
+            is_held: false,
             position: f64::from(position),
             stop: 0.0,
             sags: None,
@@ -83,25 +96,51 @@ impl Servo {
         self.table[at..at + 2].copy_from_slice(&value.to_le_bytes());
     }
 
-    /// Mounts it so that it counts the other way, or as drawn.
-    pub(super) fn mount(&mut self, is_reversed: bool) {
-        self.is_reversed = is_reversed;
-        self.set_word(GOAL_POSITION_L, self.counted(self.position.round() as u16));
+    /// Mounts it as the servo with this index of an arm.
+    pub(super) fn mount(&mut self, arm: &ArmBuild, index: usize) {
+        self.is_reversed = arm.reversed[index];
+        self.offset = f64::from(arm.offsets[index]);
+        self.ends = arm.ends[index].map(f64::from);
+        if index == SERVOS - 1 {
+            self.slope = f64::from(arm.slope);
+        }
+        self.set_word(GOAL_POSITION_L, self.counted(self.position));
         self.publish(0.0, 0.0);
     }
 
-    /// What stands in the table for a position, and the position for what stands there.
-    fn counted(&self, position: u16) -> u16 {
+    /// What stands in the table for a position.
+    fn counted(&self, position: f64) -> u16 {
+        let shifted = (position + self.offset).round();
+        let counted = shifted.clamp(0.0, f64::from(MAX_POSITION)) as u16;
         if self.is_reversed {
-            MAX_POSITION.saturating_sub(position)
+            MAX_POSITION - counted
         } else {
-            position
+            counted
+        }
+    }
+
+    /// The position for what stands in the table.
+    fn meant(&self, counted: u16) -> f64 {
+        let counted = match self.is_reversed {
+            true => MAX_POSITION.saturating_sub(counted),
+            false => counted,
+        };
+        f64::from(counted) - self.offset
+    }
+
+    /// A person brings it there, as far as the joint goes, and holds it. With torque it stays.
+    pub(super) fn bring(&mut self, position: f64) {
+        if !self.has_torque() {
+            self.is_held = true;
+            let [lower, upper] = self.ends;
+            self.position = position.clamp(lower.max(self.stop), upper);
+            self.publish(0.0, 0.0);
         }
     }
 
     /// Switches the torque on; the goal is `position`.
     pub(super) fn hold(&mut self, position: u16) {
-        self.set_word(GOAL_POSITION_L, self.counted(position));
+        self.set_word(GOAL_POSITION_L, self.counted(position.into()));
         self.table[usize::from(TORQUE_ENABLE)] = 1;
         self.publish(0.0, 0.0);
     }
@@ -112,7 +151,7 @@ impl Servo {
 
     /// Sinks for `seconds` under its load.
     pub(super) fn sag(&mut self, seconds: f64) {
-        let Some(Sag { to, units_per_s }) = self.sags else {
+        let Some(Sag { to, units_per_s }) = self.sags.filter(|_| !self.is_held) else {
             return;
         };
         let most = units_per_s * seconds;
@@ -126,8 +165,11 @@ impl Servo {
             self.rest();
             return;
         }
-        let goal = f64::from(self.counted(self.word(GOAL_POSITION_L)));
-        if goal == self.position && self.position >= self.stop {
+        self.is_held = false;
+        let goal = self.meant(self.word(GOAL_POSITION_L));
+        let [lower, upper] = self.ends;
+        let lowest = lower.max(self.stop);
+        if goal == self.position && self.position >= lowest {
             self.rest();
             return;
         }
@@ -137,13 +179,13 @@ impl Servo {
         };
         let step = (goal - self.position).clamp(-speed * seconds, speed * seconds);
         let before = self.position;
-        self.position = (before + step).max(self.stop);
+        self.position = (before + step).min(upper).max(lowest);
         let missing = goal - self.position;
-        let blocked = goal < self.stop && self.position <= self.stop;
+        let blocked = (goal < lowest && self.position <= lowest) || goal > upper;
         let torque = f64::from(self.word(TORQUE_LIMIT_L).min(1023));
         // A moving joint needs a little torque; a blocked one pushes harder far from its goal.
         let load = if blocked {
-            (missing / SLOPE * 1023.0).clamp(-torque, torque)
+            (missing / self.slope * 1023.0).clamp(-torque, torque)
         } else {
             (missing.signum() * 60.0).clamp(-torque, torque)
         };
@@ -165,10 +207,7 @@ impl Servo {
         } else {
             (units_per_s, load)
         };
-        self.set_word(
-            PRESENT_POSITION_L,
-            self.counted(self.position.round() as u16),
-        );
+        self.set_word(PRESENT_POSITION_L, self.counted(self.position));
         self.set_word(PRESENT_SPEED_L, unsigned((units_per_s / SPEED_UNIT) as i16));
         self.set_word(PRESENT_LOAD_L, unsigned(load as i16));
         self.table[usize::from(MOVING)] = u8::from(units_per_s != 0.0);

@@ -94,7 +94,7 @@ impl ServoBus {
             let id = arm.ids[index];
             (self.fitted[index], self.present[index]) = (id.is_some(), id.is_some());
             servo.table[usize::from(ID)] = id.unwrap_or(BROADCAST_ID);
-            servo.mount(arm.reversed[index]);
+            servo.mount(arm, index);
         }
     }
 
@@ -177,6 +177,20 @@ impl ServoBus {
                 servo.position = f64::from(positions[index]);
                 servo.hold(positions[index]);
             }
+        }
+    }
+
+    /// A person brings a joint, by its first servo's index, to a position, as far as it goes, and
+    /// holds it there until it has torque. A joint that has torque stays where it is.
+    pub fn bring(&mut self, joint: usize, position: f64) {
+        let second = PAIRS.iter().find(|pair| pair[0] == joint);
+        let all = second.map_or_else(|| vec![joint], |pair| pair.to_vec());
+        if all.iter().any(|servo| self.servos[*servo].has_torque()) {
+            return;
+        }
+        for servo in all {
+            let mirrored = f64::from(MAX_POSITION) - position;
+            self.servos[servo].bring(if servo == joint { position } else { mirrored });
         }
     }
 

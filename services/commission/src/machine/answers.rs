@@ -117,7 +117,7 @@ impl Commissioning {
             }
             (Question::Finish, Answer::No) => self.quit(now),
             // A person who says no to a movement, or not yet, is asked again.
-            _ => {}
+            _ => return self.arm_answered(now, answer),
         }
         Ok(())
     }

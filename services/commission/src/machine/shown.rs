@@ -12,6 +12,9 @@ impl Commissioning {
     pub fn shown(&self, now: Duration) -> Said {
         let none = || Said::from("live_none");
         match (self.state, self.step) {
+            (_, Step::Arm | Step::Poses | Step::Joints | Step::Claw) => {
+                self.arm_shown().unwrap_or_else(none)
+            }
             (State::Tells { .. }, _) => "live_tells".into(),
             (State::Calibrates { .. }, _) => {
                 let sensors = self.health.iter().flat_map(|(_, health)| health.calibrated);

@@ -94,19 +94,26 @@ impl Config {
         Built {
             robot: self.robot(),
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
+            reach_shoulder: self.logic.reach_shoulder,
+            reach_elbow: self.logic.reach_elbow,
         }
     }
 
     /// Takes over what commissioning has found out.
     pub fn take_commissioned(&mut self, built: &Built) {
         let RobotProfile {
-            steering, sensors, ..
+            steering,
+            sensors,
+            arm,
         } = built.robot;
         self.wheels = steering.wheels;
         self.battery.divider = Some(steering.divider);
         self.line = sensors.line;
         self.distance = sensors.ranger;
+        self.arm = arm;
         self.logic.cruise_mm_per_s = built.cruise_mm_per_s;
+        self.logic.reach_shoulder = built.reach_shoulder;
+        self.logic.reach_elbow = built.reach_elbow;
     }
 
     /// Writes how this robot is built into its file, whose earlier text

@@ -7,8 +7,8 @@ use lager_plant::{ArmBuild, Build, Ranger, Warehouse};
 use lager_simulator::RobotOptions;
 use lager_topics::{FailureKind, Health, ProfileState, Refusal};
 use lager_wire::{
-    ArmProfile, IrModel, JointServos, LineProfile, OneOrTwo, RangerProfile, ReversedJoints,
-    WheelsProfile,
+    ArmLimits, ArmPose, ArmProfile, IrModel, JointLimits, JointServos, LineProfile, OneOrTwo,
+    RangerProfile, ReversedJoints, SERVO_MAX, WheelsProfile,
 };
 
 use super::Whole;
@@ -16,6 +16,8 @@ use crate::config::{BatterySection, Config};
 
 /// Virtual time in which a mission must be over.
 pub(super) const LIMIT: Duration = Duration::from_secs(600);
+/// No horn of a simulated arm sits farther beside its place, in units of position.
+const LEAST: u16 = 60;
 
 /// What a person who knows the robot writes into its description.
 fn described(build: &Build) -> Config {
@@ -45,17 +47,36 @@ fn described(build: &Build) -> Config {
         ..Config::default()
     };
     config.logic.cruise_mm_per_s *= build.gear as f32;
+    for (reach, index) in [
+        (&mut config.logic.reach_shoulder, 1),
+        (&mut config.logic.reach_elbow, 3),
+    ] {
+        *reach = reach.strict_add_signed(build.arm.offsets[index]);
+    }
     config
 }
 
-/// What a person who has found the ids and the directions of the servos writes.
-pub(super) fn described_arm(arm: &ArmBuild) -> ArmProfile {
+/// What a person who knows the servos and how their horns sit writes.
+fn described_arm(arm: &ArmBuild) -> ArmProfile {
     let id = |index: usize| arm.ids[index].expect("every joint has a first servo");
     let joint = |first: usize| match arm.ids[first + 1] {
         Some(second) => OneOrTwo::Two([id(first), second]),
         None => OneOrTwo::One(id(first)),
     };
     let [base, shoulder, _, elbow, _, wrist, rotation, gripper] = arm.reversed;
+    // The arm as drawn, and where its joints are counted otherwise.
+    let drawn = ArmProfile::default();
+    let counted = |index: usize, position: u16| position.strict_add_signed(arm.offsets[index]);
+    let limits = |index: usize| ArmLimits {
+        lowest: counted(index, arm.ends[index][0].max(LEAST)),
+        highest: counted(index, arm.ends[index][1].min(SERVO_MAX - LEAST)),
+    };
+    let pose = |pose: ArmPose| ArmPose {
+        base: counted(0, pose.base),
+        shoulder: counted(1, pose.shoulder),
+        elbow: counted(3, pose.elbow),
+        wrist: counted(5, pose.wrist),
+    };
     ArmProfile {
         servos: JointServos {
             base: id(0),
@@ -73,7 +94,20 @@ pub(super) fn described_arm(arm: &ArmBuild) -> ArmProfile {
             rotation,
             gripper,
         },
-        ..ArmProfile::default()
+        limits: JointLimits {
+            base: limits(0),
+            shoulder: limits(1),
+            elbow: limits(3),
+            wrist: limits(5),
+            rotation: limits(6),
+            gripper: limits(7),
+        },
+        gripper_open: counted(7, drawn.gripper_open),
+        gripper_closed: counted(7, drawn.gripper_closed),
+        neutral: pose(drawn.neutral),
+        drop: pose(drawn.drop),
+        carry: pose(drawn.carry),
+        ..drawn
     }
 }
 

@@ -1,313 +1,27 @@
 //! Robots that nobody has described are commissioned by a person who answers from what he sees, and
-//! deliver afterwards. Only which servos the arm has stands in the description before: no question
-//! finds that out.
+//! deliver afterwards. Before that they fail, and say why.
 
-use std::f64::consts::TAU;
-use std::ops::{Deref, DerefMut};
+mod person;
+
 use std::time::Duration;
 
-use lager_commission::{Answer, Built, Commissioning, Effect, Question, Step, Way};
-use lager_orders::{Language, Mode, Moment};
-use lager_plant::{Build, Pose};
+use lager_commission::{Answer, Built, Joint, Question, Step};
+use lager_orders::Mode;
+use lager_plant::Build;
 use lager_simulator::Wire;
-use lager_stop::Stop;
-use lager_supervisor::mission::{Helper, Mission, Watch};
-use lager_topics::{Ask, AskKind, BridgeAnswer, Part, Role, StopCause};
-use lager_wire::ResetCause;
+use lager_topics::{Ask, AskKind, Origin, SteeringOrder};
+use lager_wire::{ArmProfile, Command, OneOrTwo, ResetCause, WheelCommand};
+
+pub(super) use person::Wizard;
+use person::{LINE, Person};
 
 use super::Whole;
-use super::built::{LIMIT, described_arm, robot, seeds};
+use super::built::{LIMIT, robot, seeds};
 use crate::config::Config;
-
-/// Virtual time in which a robot must be commissioned.
-const PATIENCE: Duration = Duration::from_secs(300);
-/// How long a person takes until he answers.
-const REACTION: Duration = Duration::from_millis(700);
-/// How late he is where he watches a robot that moves.
-const LATE: Duration = Duration::from_millis(80);
-/// How far he moves the line sensors to either side, in mm, and in how many seconds to and fro.
-const SWAY: (f64, f64) = (60.0, 1.6);
-/// Where the line sensors are over bare floor, and where the robot has room to turn.
-const FLOOR: Pose = pose(200.0, 200.0);
-const ROOM: Pose = pose(500.0, 500.0);
-/// On the line, with straight tape ahead.
-const LINE: Pose = pose(0.0, 0.0);
-/// The length of the measured drive, in mm.
-const DRIVE: f64 = 600.0;
-
-const fn pose(x: f64, y: f64) -> Pose {
-    Pose { x, y, heading: 0.0 }
-}
-
-/// A commissioning, and the request that waits for its answer.
-pub(super) struct Wizard {
-    machine: Commissioning,
-    asked: Option<Asked>,
-}
-
-#[derive(Clone, Copy)]
-enum Asked {
-    Part(Part),
-    Calibration,
-}
-
-impl Deref for Wizard {
-    type Target = Commissioning;
-
-    fn deref(&self) -> &Commissioning {
-        &self.machine
-    }
-}
-
-impl DerefMut for Wizard {
-    fn deref_mut(&mut self) -> &mut Commissioning {
-        &mut self.machine
-    }
-}
-
-impl Whole {
-    pub(super) fn with_wizard(&mut self, act: impl FnOnce(&mut Wizard, Moment)) {
-        let now = self.moment();
-        if let Some(wizard) = &mut self.wizard {
-            act(wizard, now);
-        }
-    }
-
-    pub(super) fn wizard_hears(&mut self, answer: &BridgeAnswer) {
-        let outcome = answer.outcome.get();
-        self.with_wizard(|wizard, now| match wizard.asked.take() {
-            Some(Asked::Part(part)) => wizard.described(now, part, outcome),
-            Some(Asked::Calibration) => wizard.calibrates(now, outcome),
-            None => {}
-        });
-    }
-}
-
-/// A robot, and a person in front of it.
-struct Person {
-    whole: Whole,
-    build: Build,
-    /// Since when the present question is asked.
-    asked: Option<(Question, Duration)>,
-    /// The robot's pose when it began to move, and since when it has moved as far as it should.
-    begun: Pose,
-    there: Option<Duration>,
-    /// How the wheels turned last.
-    ways: [Way; 2],
-    said: Vec<String>,
-    kept: Option<Built>,
-}
-
-impl Person {
-    fn new(config: &Config, build: Build, seed: u64) -> Self {
-        let mut whole = robot(config, build, seed);
-        whole.watch = Watch::new(Mission::of_others(), Helper::Nobody);
-        whole.wizard = Some(Wizard {
-            machine: Commissioning::new(config.commissioned()),
-            asked: None,
-        });
-        let mut person = Self {
-            whole,
-            build,
-            asked: None,
-            begun: LINE,
-            there: None,
-            ways: [Way::Still; 2],
-            said: Vec::new(),
-            kept: None,
-        };
-        while !person.health().boards_are_ready() {
-            person.turn();
-        }
-        person.whole.ask(&Ask {
-            kind: AskKind::SetMode.into(),
-            mode: Mode::Manual.into(),
-            ..Ask::default()
-        });
-        person
-    }
-
-    fn health(&self) -> lager_topics::Health {
-        self.whole.seen.health.unwrap_or_default()
-    }
-
-    fn machine(&mut self) -> &mut Commissioning {
-        &mut self.whole.wizard.as_mut().expect("one").machine
-    }
-
-    /// A millisecond, in which everything is done that the commissioning wants.
-    fn turn(&mut self) {
-        let _ = self.whole.turn();
-        let now = self.whole.moment();
-        self.machine().turn(now);
-        for effect in self.machine().effects() {
-            let (asked, ask) = match effect {
-                Effect::Steer(order) => {
-                    self.whole.orders.push(order);
-                    self.whole.stirred = true;
-                    continue;
-                }
-                Effect::Keep(built) => {
-                    self.kept = Some(built);
-                    continue;
-                }
-                Effect::Describe(part, robot) => (Asked::Part(part), Ask::describe(part, &robot)),
-                Effect::Calibrate => {
-                    let kind = AskKind::Calibrate.into();
-                    let ask = Ask {
-                        kind,
-                        ..Ask::default()
-                    };
-                    (Asked::Calibration, ask)
-                }
-            };
-            self.whole.wizard.as_mut().expect("one").asked = Some(asked);
-            self.whole.ask(&ask);
-        }
-        for said in self.machine().said() {
-            self.said.push(said.text(Language::English));
-        }
-    }
-
-    /// Looks and moves things, and answers what is asked.
-    fn act(&mut self) {
-        self.turn();
-        let now = self.whole.now;
-        let question = self.machine().question();
-        if self.asked.map(|(question, _)| question) != question {
-            self.asked = question.map(|question| (question, now));
-            self.there = None;
-            if let Some(question) = question {
-                self.prepare(question);
-            }
-        }
-        let Some((question, since)) = self.asked else {
-            return self.watch();
-        };
-        let pose = self.whole.robot.world().pose();
-        let is_there = match question {
-            Question::TurnRound => pose.heading - self.begun.heading >= TAU,
-            Question::SpeedThere => pose.x - self.begun.x >= DRIVE,
-            _ => now >= since + REACTION - LATE,
-        };
-        if is_there {
-            self.there.get_or_insert(now);
-        }
-        if self.there.is_some_and(|there| now >= there + LATE) {
-            let answer = self.answer(question);
-            self.asked = None;
-            let now = self.whole.moment();
-            self.machine().answer(now, answer);
-        }
-    }
-
-    /// What a person does before he answers.
-    fn prepare(&mut self, question: Question) {
-        self.begun = self.whole.robot.world().pose();
-        let world = self.whole.robot.world_mut();
-        match question {
-            Question::LineFloor => world.place(FLOOR),
-            Question::LineSway | Question::LineTape | Question::Speed => world.place(LINE),
-            Question::RangeFar => world.hold_before_ranger(300.0),
-            Question::RangeNear => world.hold_before_ranger(200.0),
-            Question::WheelsAhead | Question::WheelsLeft => {
-                self.ways = [Way::Still; 2];
-                world.lift();
-            }
-            Question::Turn => world.place(ROOM),
-            _ => {}
-        }
-    }
-
-    /// What a person does and sees while nothing is asked.
-    fn watch(&mut self) {
-        let now = self.whole.now.as_secs_f64();
-        let step = self.machine().step();
-        let world = self.whole.robot.world_mut();
-        if step == Step::Line {
-            let (far, period) = SWAY;
-            let y = far * (TAU * now / period).sin();
-            world.place(Pose { y, ..LINE });
-        }
-        for (way, speed) in self.ways.iter_mut().zip(world.state().wheel_speeds) {
-            match speed {
-                20.0.. => *way = Way::Forwards,
-                ..-20.0 => *way = Way::Backwards,
-                _ => {}
-            }
-        }
-    }
-
-    fn answer(&self, question: Question) -> Answer {
-        match question {
-            Question::RangeFar => Answer::Number(30.0),
-            Question::RangeNear => Answer::Number(20.0),
-            Question::SawAhead | Question::SawLeft => Answer::Ways(self.ways),
-            Question::Battery if self.build.divider => {
-                Answer::Number(self.whole.robot.world().battery_volts() as f32)
-            }
-            Question::Battery => Answer::No,
-            Question::Speed => Answer::Number((DRIVE / 10.0) as f32),
-            _ => Answer::Yes,
-        }
-    }
-
-    /// Everything, until it is to be saved.
-    fn commission(&mut self) -> Built {
-        let end = self.whole.now + PATIENCE;
-        while !self.machine().is_over() {
-            self.act();
-            assert!(self.whole.now < end, "{:?}: {:?}", self.build, self.said);
-        }
-        self.turn();
-        self.kept.expect("it was saved")
-    }
-
-    /// Goes on until this is asked.
-    fn until(&mut self, question: Question) {
-        let end = self.whole.now + PATIENCE;
-        while self.machine().question() != Some(question) {
-            self.act();
-            assert!(self.whole.now < end, "{question:?}: {:?}", self.said);
-        }
-    }
-
-    /// Goes on without any answer.
-    fn wait(&mut self, span: Duration) {
-        let end = self.whole.now + span;
-        while self.whole.now < end {
-            self.turn();
-        }
-    }
-
-    fn say(&mut self, answer: Answer) {
-        let now = self.whole.moment();
-        self.machine().answer(now, answer);
-    }
-
-    /// Somebody else stops the robot.
-    fn stop(&mut self) {
-        let stop = Stop::new(Role::Operator, StopCause::Ordered, 1);
-        self.whole.bridge.stop(stop);
-        self.whole.stirred = true;
-    }
-
-    fn duties(&self) -> [i16; 2] {
-        self.whole.robot.world().duties()
-    }
-}
-
-/// A robot of which nobody has said more than which servos its arm has.
-fn unknown(build: &Build) -> Config {
-    Config {
-        arm: described_arm(&build.arm),
-        ..Config::default()
-    }
-}
 
 /// The same robot, started again as it was commissioned, at the start of its warehouse.
 fn restarted(person: Person, built: &Built, seed: u64) -> Whole {
-    let mut config = unknown(&person.build);
+    let mut config = Config::default();
     config.take_commissioned(built);
     let mut whole = robot(&config, person.build, seed);
     whole.robot = person.whole.robot;
@@ -320,7 +34,7 @@ fn restarted(person: Person, built: &Built, seed: u64) -> Whole {
 fn a_robot_that_nobody_described_is_commissioned_and_delivers() {
     for seed in seeds() {
         let build = Build::drawn(seed);
-        let mut person = Person::new(&unknown(&build), build, seed);
+        let mut person = Person::new(&Config::default(), build, seed);
         let built = person.commission();
         let wheels = built.robot.steering.wheels;
         let turn_s = f64::from(wheels.full_turn_ms) / 1_000.0;
@@ -336,6 +50,7 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers() {
             build.reversed,
             "seed {seed}"
         );
+        assert_arm(&built.robot.arm, &build, seed);
         let mut whole = restarted(person, &built, seed);
         let limit = whole.now + LIMIT;
         assert_eq!(whole.run(limit), None, "seed {seed}: {build:?} {built:?}");
@@ -344,16 +59,56 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers() {
 }
 
 #[test]
-fn before_that_it_fails_and_says_why_if_its_build_matters() {
+fn before_that_it_fails_and_says_why() {
     for seed in seeds() {
         let build = Build::drawn(seed);
-        if !(build.swapped || build.reversed != [false; 2] || build.dark_is_low) {
-            continue;
-        }
-        let mut whole = robot(&unknown(&build), build, seed);
+        let mut whole = robot(&Config::default(), build, seed);
         let why = whole.run(LIMIT).expect("it cannot deliver");
+        println!("seed {seed}: {why}");
         assert!(whole.failure_kind().is_some(), "seed {seed}: {why}");
     }
+}
+
+/// The arm is known as it is built.
+fn assert_arm(found: &ArmProfile, build: &Build, seed: u64) {
+    let arm = &build.arm;
+    let values = found.servo_values();
+    for joint in Joint::ALL {
+        let first = joint.servo();
+        let [one, other] = [first, (first + 1).min(7)].map(|index| arm.ids[index]);
+        let pair = match joint {
+            Joint::Shoulder => Some(found.servos.shoulder),
+            Joint::Elbow => Some(found.servos.elbow),
+            _ => None,
+        };
+        // Of two that face each other, one counts as drawn, and that one is the first.
+        if let (Some(OneOrTwo::Two(pair)), Some(one), Some(other)) = (pair, one, other) {
+            let counts = if arm.reversed[first] {
+                [other, one]
+            } else {
+                [one, other]
+            };
+            assert_eq!(pair, counts, "seed {seed}: {joint:?}");
+            continue;
+        }
+        assert!(
+            !matches!(pair, Some(OneOrTwo::Two(_))),
+            "seed {seed}: {joint:?}"
+        );
+        assert_eq!(Some(values[first] as u8), one, "seed {seed}: {joint:?}");
+        let is_reversed = values[first] & lager_wire::REVERSED != 0;
+        assert_eq!(is_reversed, arm.reversed[first], "seed {seed}: {joint:?}");
+    }
+    let closed = ArmProfile::default()
+        .gripper_closed
+        .strict_add_signed(arm.offsets[7]);
+    assert!(
+        found.gripper_closed.abs_diff(closed) <= 6,
+        "seed {seed}: {found:?}"
+    );
+    let [lower, upper] = arm.ends[0].map(|end| end.strict_add_signed(arm.offsets[0]));
+    let told = found.limits.base;
+    assert_eq!([told.lowest, told.highest], [lower, upper], "seed {seed}");
 }
 
 #[test]
@@ -385,7 +140,7 @@ fn it_begins_only_with_boards_that_a_person_may_move() {
 
 #[test]
 fn whoever_quits_leaves_the_boards_with_what_they_were_told_before() {
-    let mut person = Person::new(&unknown(&Build::drawn(1)), Build::drawn(1), 1);
+    let mut person = Person::new(&Config::default(), Build::drawn(1), 1);
     let before = person.health().description;
     person.until(Question::WheelsLeft);
     assert_ne!(person.health().description, before);
@@ -474,6 +229,141 @@ fn a_stop_and_a_board_that_restarts_end_the_step_and_the_robot_stands() {
     assert!(
         person.machine().built().robot.sensors.ranger.model == Config::default().distance.model
     );
+}
+
+/// Where the servos are, as drawn.
+fn servos(person: &Person) -> [u16; 8] {
+    person.whole.robot.world().state().servo_positions
+}
+
+#[test]
+fn a_joint_moves_only_while_the_button_is_held_and_by_itself() {
+    let mut person = Person::new(&Config::default(), Build::default(), 1);
+    person.until(Question::JointMoves);
+    let before = servos(&person);
+    person.wait(Duration::from_secs(5));
+    assert_eq!(servos(&person), before, "nobody holds the button");
+
+    person.say(Answer::Hold);
+    person.wait(Duration::from_millis(300));
+    let moving = servos(&person);
+    assert_ne!(moving[0], before[0]);
+    assert_eq!(moving[1..], before[1..], "one joint at a time");
+    person.wait(Duration::from_secs(1));
+    let stands = servos(&person);
+    person.wait(Duration::from_secs(2));
+    assert_eq!(servos(&person), stands, "one press lasts a moment");
+    assert_eq!(person.machine().question(), Some(Question::JointMoves));
+
+    person.say(Answer::Hold);
+    person.wait(Duration::from_millis(200));
+    assert_ne!(servos(&person), stands);
+    person.stop();
+    person.wait(Duration::from_millis(300));
+    let stopped = servos(&person);
+    for _ in 0..50 {
+        person.say(Answer::Hold);
+        person.wait(Duration::from_millis(40));
+    }
+    assert_eq!(servos(&person), stopped, "the stop wins");
+    let said = person.said.join("; ");
+    assert!(said.contains("the robot is stopped"), "{said}");
+}
+
+#[test]
+fn a_joint_stops_when_nobody_is_there_any_more_who_renews_its_order() {
+    let mut person = Person::new(&Config::default(), Build::default(), 1);
+    person.until(Question::JointMoves);
+    let before = servos(&person);
+    person.say(Answer::Hold);
+    person.wait(Duration::from_millis(200));
+    assert_ne!(servos(&person), before);
+    // The process that commissions is dead.
+    person.whole.wizard = None;
+    let mut run = |span: u64| {
+        let end = person.whole.now + Duration::from_millis(span);
+        while person.whole.now < end {
+            let _ = person.whole.turn();
+        }
+        servos(&person)
+    };
+    let stands = run(500);
+    assert_eq!(run(2_000), stands);
+}
+
+/// The duties while somebody orders the robot to drive.
+fn drives(person: &mut Person, id: u32) -> [i16; 2] {
+    for _ in 0..10 {
+        person.whole.orders.push(SteeringOrder {
+            given_ns: person.whole.moment().ns,
+            id,
+            origin: Origin::Operator.into(),
+            code: Command::Wheel(WheelCommand::ManualForward).code(),
+            ..SteeringOrder::default()
+        });
+        person.whole.stirred = true;
+        person.wait(Duration::from_millis(20));
+    }
+    person.duties()
+}
+
+#[test]
+fn the_wheels_stand_while_the_arm_is_limp_and_whoever_quits_gives_it_its_strength_back() {
+    let mut person = Person::new(&Config::default(), Build::default(), 1);
+    person.until(Question::PoseDrop);
+    person.wait(Duration::from_secs(1));
+    assert_eq!(drives(&mut person, 4_711), [0, 0]);
+    // The arm sinks if nobody holds it.
+    let now = person.whole.moment();
+    person.machine().quit(now);
+    person.wait(Duration::from_secs(1));
+    assert!(person.machine().is_over());
+    assert_ne!(drives(&mut person, 4_712), [0, 0]);
+    let holds = servos(&person);
+    person.wait(Duration::from_secs(5));
+    assert_eq!(servos(&person), holds);
+}
+
+#[test]
+fn servos_that_are_too_few_or_do_not_move_are_named_and_asked_for_again() {
+    let mut arm = lager_plant::ArmBuild::default();
+    (arm.ids[2], arm.ids[4]) = (None, None);
+    let build = Build {
+        arm,
+        ..Build::default()
+    };
+    let mut person = Person::new(&Config::default(), build, 1);
+    person
+        .whole
+        .robot
+        .world_mut()
+        .servos()
+        .set_present(7, false);
+    person.until(Question::Arm);
+    person.said.clear();
+    person.say(Answer::Yes);
+    person.wait(Duration::from_secs(60));
+    let said = person.said.join("; ");
+    assert!(
+        said.contains("5 servos answer, at: 1, 2, 4, 6, 8"),
+        "{said}"
+    );
+    assert_eq!(person.machine().question(), Some(Question::Arm));
+
+    person.whole.robot.world_mut().servos().set_present(7, true);
+    person.until(Question::JointEnd);
+    person.said.clear();
+    for _ in 0..2 {
+        person.say(Answer::Yes);
+        person.wait(Duration::from_secs(3));
+    }
+    let said = person.said.join("; ");
+    assert!(said.contains("base: no servo moved"), "{said}");
+    let asked = person.machine().joint();
+    assert_eq!(asked, Some((Joint::Base, false)));
+    // What is asked again can be shown again.
+    person.asked = None;
+    person.until(Question::Poses);
 }
 
 #[test]
