@@ -404,8 +404,8 @@ fn a_robot_that_nobody_described_is_set_up_by_clicks_and_delivers() {
     assert!(was_reloaded && was_stopped);
     let page = &mut person.page;
     page.wait_for("#commission .question", "robot.toml has it");
-    page.wait_for("#commission .found", "A full turn takes");
-    page.wait_for("#commission .found", "Nothing measures the battery");
+    page.wait_for("#commission .steps", "A full turn takes");
+    page.wait_for("#commission .steps", "Nothing measures the battery");
     // The file can be carried to another machine.
     page.save_into(scene.domain.folder());
     does(page, "save");

@@ -111,9 +111,13 @@ fn board(callsign: Callsign, rebooted: bool) -> Up {
 
 /// Answers everything that a board is asked; what it was asked.
 fn obey(profiles: &mut Profiles, callsign: Callsign) -> Vec<Setting> {
+    obey_at(profiles, callsign, ms(0))
+}
+
+fn obey_at(profiles: &mut Profiles, callsign: Callsign, now: Duration) -> Vec<Setting> {
     let mut told = Vec::new();
-    while let Some(setting) = profiles.poll(ms(0), callsign) {
-        assert!(profiles.answer(ms(0), &accepted(&setting)));
+    while let Some(setting) = profiles.poll(now, callsign) {
+        assert!(profiles.answer(now, &accepted(&setting)));
         told.push(setting);
     }
     told
@@ -243,12 +247,12 @@ fn a_successor_that_tells_otherwise_does_not_trust_what_the_board_knows() {
     let mut profiles = Profiles::new(&robot, None);
     profiles.board_up(ms(0), &board(Callsign::Steering, true));
     obey(&mut profiles, Callsign::Steering);
-    let ask = Ask::describe(Part::Steering, &exchanged());
+    let ask = Ask::describe(Part::Steering, &swapped());
     assert!(profiles.describe(ms(0), Part::Steering, &ask, Version::One));
     obey(&mut profiles, Callsign::Steering);
     let mut kept = Health::default();
     profiles.fill(&mut kept);
-    for (configured, gate) in [(robot, Gate::Held), (exchanged(), Gate::Open)] {
+    for (configured, gate) in [(robot, Gate::Held), (swapped(), Gate::Open)] {
         let mut successor = Profiles::new(&configured, Some(&kept));
         successor.board_up(ms(0), &board(Callsign::Steering, false));
         assert_eq!(successor.wheels(), gate);
@@ -272,15 +276,6 @@ fn a_board_that_never_answers_hears_of_its_arm_all_the_same() {
     );
 }
 
-/// Both boards take everything that they are told.
-fn take_all(profiles: &mut Profiles, now: Duration) {
-    for board in [Callsign::Sensor, Callsign::Steering] {
-        while let Some(setting) = profiles.poll(now, board) {
-            profiles.answer(now, &accepted(&setting));
-        }
-    }
-}
-
 fn told(profiles: &Profiles) -> u32 {
     let mut health = Health::default();
     profiles.fill(&mut health);
@@ -296,20 +291,14 @@ fn tried(ask: &Ask) -> (Profiles, u32) {
         "nobody obeys it yet"
     );
     assert!(profiles.describe(ms(0), Part::Steering, ask, Version::One));
-    take_all(&mut profiles, ms(0));
+    obey(&mut profiles, Callsign::Steering);
     assert_ne!(told(&profiles), before);
     (profiles, before)
 }
 
-fn exchanged() -> RobotProfile {
-    let mut robot = RobotProfile::default();
-    robot.steering.wheels.swapped = true;
-    robot
-}
-
 #[test]
 fn a_description_that_nobody_tries_any_more_is_taken_back() {
-    let ask = Ask::try_out(Part::Steering, &exchanged());
+    let ask = Ask::try_out(Part::Steering, &swapped());
     let (mut profiles, before) = tried(&ask);
     assert!(profiles.renew(ms(4_000), Part::Steering, &ask));
     assert_eq!(profiles.lapse(ms(8_999)), []);
@@ -317,20 +306,20 @@ fn a_description_that_nobody_tries_any_more_is_taken_back() {
     assert_eq!(profiles.lapse(ms(9_000)), [Part::Steering]);
     assert_eq!(told(&profiles), before);
     assert_eq!(profiles.wheels(), Gate::Held, "the board has to take it");
-    take_all(&mut profiles, ms(9_000));
+    obey_at(&mut profiles, Callsign::Steering, ms(9_000));
     assert_eq!(profiles.wheels(), Gate::Open);
     assert_eq!(profiles.lapse(ms(99_000)), []);
 }
 
 #[test]
 fn of_trials_one_after_the_other_that_is_taken_back_which_held_before_all() {
-    let ask = Ask::try_out(Part::Steering, &exchanged());
+    let ask = Ask::try_out(Part::Steering, &swapped());
     let (mut profiles, before) = tried(&ask);
-    let mut third = exchanged();
+    let mut third = swapped();
     third.steering.wheels.left_reversed = true;
     let ask = Ask::try_out(Part::Steering, &third);
     assert!(profiles.describe(ms(2_000), Part::Steering, &ask, Version::One));
-    take_all(&mut profiles, ms(2_000));
+    obey_at(&mut profiles, Callsign::Steering, ms(2_000));
     assert_eq!(profiles.lapse(ms(6_999)), []);
     assert_eq!(profiles.lapse(ms(7_000)), [Part::Steering]);
     assert_eq!(told(&profiles), before);
@@ -338,8 +327,8 @@ fn of_trials_one_after_the_other_that_is_taken_back_which_held_before_all() {
 
 #[test]
 fn what_is_told_for_good_after_a_trial_stays() {
-    let (mut profiles, before) = tried(&Ask::try_out(Part::Steering, &exchanged()));
-    let ask = Ask::describe(Part::Steering, &exchanged());
+    let (mut profiles, before) = tried(&Ask::try_out(Part::Steering, &swapped()));
+    let ask = Ask::describe(Part::Steering, &swapped());
     assert!(profiles.renew(ms(1_000), Part::Steering, &ask));
     assert_eq!(profiles.lapse(ms(99_000)), []);
     assert_ne!(told(&profiles), before);

@@ -101,7 +101,7 @@ export class Answers {
    * @param {string} text
    */
   typed(isNumber, text) {
-    const form = element(this.place, "form", "row");
+    const form = element(this.place, "form");
     const input = document.createElement("input");
     input.setAttribute("aria-label", word("answer"));
     input.autocomplete = "off";

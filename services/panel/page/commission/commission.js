@@ -34,6 +34,8 @@ export class Commission {
     /** What was refused last, and what was asked then. */
     this.refused = { said: "", at: "" };
     this.isLeaving = false;
+    /** What there is to choose. */
+    this.can = "";
     this.hereAt = -Infinity;
     this.answeredAt = -Infinity;
     const look = document.createElement("link");
@@ -51,12 +53,11 @@ export class Commission {
     this.why.setAttribute("role", "alert");
     this.live = new Live(element(main, "div", "drawing"));
     this.shows = element(main, "p", "shows");
-    this.found = element(main, "ul", "found");
     const foot = element(main, "footer");
     this.answers = new Answers(element(foot, "div", "answers"), (answer) => this.answer(answer), () => this.say("stand"));
     this.said = element(foot, "p", "said");
     this.said.setAttribute("role", "alert");
-    this.ways = element(foot, "p", "row ways-on");
+    this.ways = element(foot, "p", "row");
     // A key that is held answers once.
     view.addEventListener("keydown", (event) => event.key === "Enter" && event.repeat && event.preventDefault());
     setInterval(() => this.stay(performance.now()), HERE_MOVING_MS);
@@ -165,7 +166,6 @@ export class Commission {
     put(this.why, isAtWork ? sentences(field(how.why) ?? "") : "");
     put(this.shows, isAtWork && asked ? field(how.shows) ?? "" : "");
     if (robot) this.live.draw(robot, how.step, how.shows);
-    this.drawFound(isAtWork ? [] : robot?.found ?? []);
     const { isMine } = this;
     this.answers.draw({ asked: how.asked, takes: how.takes, moves: how.moves === "1", language: current() }, isAtWork && isMine && !this.isLeaving, time);
     if (this.refused.at !== (how.asked ?? "")) this.refused = { said: "", at: how.asked ?? "" };
@@ -206,16 +206,6 @@ export class Commission {
     });
   }
 
-  /** @param {[string, string][]} found */
-  drawFound(found) {
-    const lines = found.map(([, said]) => sentences(field(said) ?? ""));
-    const key = lines.join("\n");
-    if (this.found.dataset.key === key) return;
-    this.found.dataset.key = key;
-    this.found.replaceChildren();
-    for (const line of lines) element(this.found, "li", "", line);
-  }
-
   /**
    * What leads from step to step, and in and out of all of it.
    *
@@ -228,8 +218,8 @@ export class Commission {
     const isManual = robot?.state.mode === "manual";
     const isFirst = robot?.commission?.step === "boards";
     const can = [isAtWork, isMine, link.mayDrive, this.isLeaving, isAtWork && isFirst && !isManual, hasEnded, robot?.kept.length, current(), robot?.name].join(" ");
-    if (this.ways.dataset.can === can) return;
-    this.ways.dataset.can = can;
+    if (this.can === can) return;
+    this.can = can;
     const hadFocus = this.ways.contains(document.activeElement);
     this.ways.replaceChildren();
     /** @type {(does: string, press: () => void, className?: string) => HTMLButtonElement} */

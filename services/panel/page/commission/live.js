@@ -18,7 +18,7 @@ export class Live {
   /** @param {HTMLElement} place */
   constructor(place) {
     this.place = place;
-    this.svg = make("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img" }, place);
+    this.svg = make("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "xMinYMid", role: "img" }, place);
     /** What is drawn, and in which language. */
     this.kind = "";
     /**
@@ -127,7 +127,7 @@ function range(svg) {
 function duty(svg) {
   const high = HEIGHT - 30;
   const bars = ["left", "right"].map((side, index) => {
-    const x = WIDTH / 2 + (index ? 40 : -160);
+    const x = index * 160 + 1;
     make("rect", { x, y: 1, width: 120, height: high - 1, rx: 2, class: "box" }, svg);
     make("text", { x: x + 60, y: HEIGHT - 8 }, svg, word(side));
     return make("rect", { x: x + 1, width: 118, class: "fill" }, svg);
