@@ -506,7 +506,7 @@ impl World {
                     self.bus.stop = Some(stop);
                     None
                 }
-                Effect::Map(_) | Effect::Do(_) => None,
+                Effect::Map(_) | Effect::Do(_) | Effect::Commission { .. } => None,
             };
             if let (Some(line), Some(link)) = (line, comm.link) {
                 let by_itself = self.way != Way::ByHand;

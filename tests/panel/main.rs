@@ -3,6 +3,7 @@
 
 mod away;
 mod browser;
+mod commissioning;
 mod driving;
 mod editing;
 mod fleet;

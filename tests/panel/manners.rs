@@ -7,6 +7,8 @@ use serde_json::{Value, json};
 
 use crate::Scene;
 use crate::browser::{Browser, Page};
+use crate::commissioning::AT_WORK;
+use crate::played::Stage;
 
 /// Whether headline, chip, banner and the robot's colour and shape show that it is stopped.
 const LOOKS_STOPPED: &str = "(() => { const at = (part) => document.querySelector(part); \
@@ -373,6 +375,12 @@ fn an_accessibility_checker_finds_nothing() {
         );
         check(&mut page, tab);
     }
+    page.click("#tab-setup");
+    page.click_until(
+        "#commission-open",
+        "document.querySelector('#commission [data-does]') !== null",
+    );
+    check(&mut page, "setting up a robot");
     page.click("#help-open");
     check(&mut page, "help");
     page.click("#help-close");
@@ -397,6 +405,20 @@ fn an_accessibility_checker_finds_nothing() {
     page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");
     page.value(&axe);
     check(&mut page, "screen");
+    let stage = Stage::new(None);
+    let robot = stage.robot("r1", &AT_WORK);
+    let mut at_work = stage.page(&stage.url);
+    at_work.click("#tab-setup");
+    at_work.click("#commission-open");
+    at_work.wait_for("#commission h2", "Line sensors");
+    at_work.value(&axe);
+    check(&mut at_work, "setting up, at work");
+    let ways = AT_WORK[1].replace("takes=yes", "takes=ways");
+    robot.says(&[AT_WORK[0], &ways, AT_WORK[2]]);
+    at_work.wait_until("document.querySelector('#commission fieldset') !== null");
+    check(&mut at_work, "setting up, ways");
+    drop((at_work, robot));
+    stage.end();
     assert!(found.is_empty(), "{found:#?}");
     drop(page);
     scene.end();

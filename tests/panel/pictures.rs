@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use crate::Scene;
 use crate::browser::Page;
+use crate::commissioning::AT_WORK;
 use crate::played::Stage;
 
 /// Name, width and height in pixels, and whether the screen is held in the hand.
@@ -227,6 +228,69 @@ fn of_what_is_rare() {
     let mut page = stage.page(&stage.url);
     page.wait_for("#link", " ms");
     view(&mut page, "large");
+    drop((page, robot));
+    stage.end();
+}
+
+#[test]
+#[ignore = "it makes pictures: tests/screenshots"]
+fn of_setting_up_a_robot() {
+    let stage = Stage::new(None);
+    let robot = stage.robot("r1", &[AT_WORK[0], "commission"]);
+    let mut page = stage.page(&stage.url);
+    page.wait_for("#remedy", "Set up a robot");
+    view(&mut page, "undescribed");
+    page.click("#remedy");
+    page.wait_for("#commission", "Begin");
+    view(&mut page, "set-up-robot");
+    page.click("#tab-drive");
+    page.click("#control");
+    page.wait_for("#control", "You drive");
+    page.click("#tab-setup");
+    page.click("#commission-open");
+    let found = "found 4 line found_polarity_low distance found_model%20gp2y0a02 wheels \
+        found_wheels%20are%20are%20not battery found_no_divider";
+    let asks = |name: &str, how: &str, more: &str, page: &mut Page| {
+        let state = format!("{} {more}", AT_WORK[0]);
+        robot.says(&[&state, &format!("commission {how}"), found]);
+        page.wait_for("#commission .steps [aria-current]", "");
+        std::thread::sleep(Duration::from_millis(800));
+        view(page, &format!("set-up-robot-{name}"));
+    };
+    let line = AT_WORK[1].replacen("commission ", "", 1);
+    asks("line", &line, "", &mut page);
+    asks(
+        "distance",
+        "asked=9 step=distance place=3 steps=8 question=ask_range_far takes=number moves=0 \
+         shows=live_range%20289",
+        "",
+        &mut page,
+    );
+    asks(
+        "ways",
+        "asked=12 step=wheels place=4 steps=8 question=ask_saw_ahead takes=ways moves=0 \
+         shows=live_wheels%200%200",
+        "",
+        &mut page,
+    );
+    asks(
+        "turn",
+        "asked=15 step=turn place=6 steps=8 question=ask_turn_round takes=yes moves=1 \
+         shows=live_seconds%203.4",
+        "",
+        &mut page,
+    );
+    let file = "/var/lib/lager/r1/robot.toml";
+    robot.says(&[
+        AT_WORK[0],
+        &format!("commission ended=ended_kept%20{file}"),
+        found,
+        "kept 1 1 [wheels]",
+    ]);
+    page.wait_for("#commission .question", "has it");
+    view(&mut page, "set-up-robot-over");
+    page.change_language();
+    view(&mut page, "set-up-robot-over-swedish");
     drop((page, robot));
     stage.end();
 }

@@ -55,7 +55,7 @@ impl Scene {
         Self::on(Domain::among_others(), 1.0, &[])
     }
 
-    fn on(domain: Domain, speed: f64, more: &[&str]) -> Self {
+    pub(crate) fn on(domain: Domain, speed: f64, more: &[&str]) -> Self {
         let speed_word = speed.to_string();
         let mut args = vec!["up", "--panel", "127.0.0.1:0", "--speed", &speed_word];
         args.extend(more);

@@ -171,6 +171,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     (
         "lager-panel",
         &[
+            "lager-commission",
             "lager-plant",
             "lager-door",
             "lager-floor",

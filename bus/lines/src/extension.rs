@@ -104,6 +104,8 @@
 //!                                      the most that it has read, 0 to 255 and higher over tape,
 //!                                      and 1 once that is both floor and tape
 //! health {<key>=<value>}               once a second: machine, services, boards; see `Health`
+//! commission {<key>=<value>}           how far a commissioning is; see `Commissioning`, which has
+//!                                      `found` and `kept`, too
 //! thinks {<key>=<value>}               the `thought` that follows, in values; see `Thinks`
 //! because <reason>                     why it says the `thought` that follows
 //! thought <text>                       as in the document
@@ -121,8 +123,8 @@
 //! is divided into four equal parts. Bucket 89 holds what took longer than 2^30 ns. A bucket
 //! counts the frames since the robot made such a line before, at most 999999.
 //!
-//! A list may be empty here. The robot sends `route`, `blocked`, `queue`, `obstacles`, `gone` and
-//! `sensors` when they have changed. A line that cannot be read changes nothing; if it has a
+//! A list may be empty here. The robot sends `route`, `blocked`, `queue`, `obstacles`, `gone`,
+//! `sensors`, `commission` and `found` when they have changed. A line that cannot be read changes nothing; if it has a
 //! number, the robot answers `refused`.
 //!
 //! ```
@@ -150,6 +152,7 @@
 //! );
 //! ```
 
+mod commission;
 mod fields;
 mod health;
 mod hello;
@@ -160,6 +163,7 @@ mod report;
 mod state;
 mod thinks;
 
+pub use commission::{Commissioning, FoundOut, KeptLine};
 pub use fields::{Degrees, Loads, Servos};
 pub use health::{Finding, Findings, Health, Release, Service, Services};
 pub use hello::Hello;

@@ -6,6 +6,7 @@ use core::time::Duration;
 use lager_floor::{Place, ProductId};
 use lager_wire::{Callsign, OperatorArm, OperatorCommand, Speed};
 
+use crate::commission::Commission;
 use crate::lease::{LATEST, LATEST_MOVE};
 use crate::mode::{Mode, Pick};
 
@@ -90,6 +91,8 @@ pub enum Action {
         /// The edge: a node and the direction from it.
         way: Place,
     },
+    /// `commission`: what a person says to the commissioning of the robot.
+    Commission(Commission),
 }
 
 impl Action {
@@ -102,6 +105,8 @@ impl Action {
     pub const fn latest(self) -> Duration {
         match self {
             Self::Drive { wheels, .. } if wheels.is_stop() => Duration::MAX,
+            Self::Commission(said) if said.is_end() => Duration::MAX,
+            Self::Commission(said) if said.may_move() => LATEST_MOVE,
             Self::Drive { .. }
             | Self::Arm(_)
             | Self::Resume { .. }

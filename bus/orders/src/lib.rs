@@ -1,6 +1,7 @@
 //! The orders of an operator to a robot, how long each holds, and the sentences about them.
 //!
 //! - [`Action`]: what an operator can ask.
+//! - [`Commission`]: what a person says to a commissioning.
 //! - [`EventKind`]: what happens on a mission.
 //! - [`lease`]: how long an order holds, and how late one may come.
 //! - [`Moment`]: a time on both clocks, robot time and real time.
@@ -18,6 +19,7 @@
 extern crate alloc;
 
 mod action;
+mod commission;
 mod event;
 mod late;
 pub mod lease;
@@ -27,6 +29,7 @@ mod reason;
 mod sentence;
 
 pub use action::{Action, LeaseMs, Put, Wheels};
+pub use commission::{AnswerWord, Commission};
 pub use event::EventKind;
 pub use late::Late;
 pub use mode::{Mode, Pick};

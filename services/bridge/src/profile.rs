@@ -53,6 +53,17 @@ pub struct Profiles {
     tellers: [ProfileTeller; 3],
     /// A hash of everything that is told.
     told: u32,
+    /// The parts that somebody tries.
+    trials: [Option<Trial>; 3],
+}
+
+/// A description that somebody tries. He may die meanwhile.
+#[derive(Clone, Debug)]
+struct Trial {
+    /// What the board was told before.
+    before: ProfileTeller,
+    /// Until when it holds.
+    until: Duration,
 }
 
 impl Profiles {
@@ -65,7 +76,11 @@ impl Profiles {
             ProfileTeller::new(&robot.arm),
         ];
         let told = hash_of(&tellers);
-        let mut profiles = Self { tellers, told };
+        let mut profiles = Self {
+            tellers,
+            told,
+            trials: Default::default(),
+        };
         if let Some(kept) = kept.filter(|kept| kept.description == told) {
             let states = [kept.steering_profile, kept.sensor_profile, kept.arm_profile];
             for (teller, state) in profiles.tellers.iter_mut().zip(states) {
@@ -78,17 +93,10 @@ impl Profiles {
     /// Has the board of a part told what a request says instead of what was told before. Returns
     /// whether a board can obey that.
     pub fn describe(&mut self, now: Duration, part: Part, ask: &Ask, version: Version) -> bool {
-        let teller = match part {
-            Part::Steering => ask
-                .told::<SteeringProfile>()
-                .as_ref()
-                .map(ProfileTeller::new),
-            Part::Sensors => ask.told::<SensorProfile>().as_ref().map(ProfileTeller::new),
-            Part::Arm => ask.told::<ArmProfile>().as_ref().map(ProfileTeller::new),
-        };
-        let Some(mut teller) = teller else {
+        let Some(mut teller) = ProfileTeller::asked_for(part, ask) else {
             return false;
         };
+        self.hold(now, part, ask);
         let told = &mut self.tellers[part as usize];
         // An answer to what was told before is on its way perhaps, and counts for nothing.
         teller.seq = told.seq;
@@ -96,6 +104,54 @@ impl Profiles {
         *told = teller;
         self.told = hash_of(&self.tellers);
         true
+    }
+
+    /// The same where the board obeys it already. Returns whether it does.
+    pub fn renew(&mut self, now: Duration, part: Part, ask: &Ask) -> bool {
+        let told = &self.tellers[part as usize];
+        let asked = ProfileTeller::asked_for(part, ask);
+        let is_told = asked.is_some_and(|asked| asked.settings.iter().eq(told.settings.iter()));
+        let is_obeyed = is_told && told.state == ProfileState::Accepted;
+        if is_obeyed {
+            self.hold(now, part, ask);
+        }
+        is_obeyed
+    }
+
+    /// Notes until when a part is tried.
+    fn hold(&mut self, now: Duration, part: Part, ask: &Ask) {
+        let trial = &mut self.trials[part as usize];
+        let before = trial.take().map(|trial| trial.before);
+        if ask.trial_ms > 0 {
+            *trial = Some(Trial {
+                before: before.unwrap_or_else(|| self.tellers[part as usize].clone()),
+                until: now + Duration::from_millis(ask.trial_ms.into()),
+            });
+        }
+    }
+
+    /// Takes back what nobody tries any more. Returns those parts.
+    pub fn lapse(&mut self, now: Duration) -> Vec<Part> {
+        let mut over = Vec::new();
+        for part in Part::ALL {
+            let trial = self.trials[part as usize].take_if(|trial| trial.until <= now);
+            let Some(Trial { mut before, .. }) = trial else {
+                continue;
+            };
+            let told = &mut self.tellers[part as usize];
+            before.seq = told.seq;
+            match told.state {
+                ProfileState::NoBoard => before.board_down(),
+                // A board took it, so it takes settings.
+                _ => before.board_up(now, Version::One, true),
+            }
+            *told = before;
+            over.push(part);
+        }
+        if !over.is_empty() {
+            self.told = hash_of(&self.tellers);
+        }
+        over
     }
 
     /// A board has come up and gets everything.
@@ -136,7 +192,11 @@ impl Profiles {
         let [steering, sensors, arm] = &self.tellers;
         let arm = (steering.state != ProfileState::Telling).then_some(arm);
         let tellers = [Some(steering), Some(sensors), arm].into_iter().flatten();
-        tellers.filter_map(ProfileTeller::next_due).min()
+        let trials = self.trials.iter().flatten().map(|trial| trial.until);
+        tellers
+            .filter_map(ProfileTeller::next_due)
+            .chain(trials)
+            .min()
     }
 
     /// A board has answered. Returns whether the bridge was waiting for this answer.
@@ -234,6 +294,15 @@ impl ProfileTeller {
             seq: 0,
             tries: 0,
             next_try: None,
+        }
+    }
+
+    /// Sends the part of a profile that a request describes, if a board can obey it.
+    fn asked_for(part: Part, ask: &Ask) -> Option<Self> {
+        match part {
+            Part::Steering => ask.told::<SteeringProfile>().as_ref().map(Self::new),
+            Part::Sensors => ask.told::<SensorProfile>().as_ref().map(Self::new),
+            Part::Arm => ask.told::<ArmProfile>().as_ref().map(Self::new),
         }
     }
 

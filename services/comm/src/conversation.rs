@@ -76,6 +76,7 @@ use crate::memory::Memory;
 use crate::speech::Told;
 use crate::telling::Telling;
 
+mod commissioning;
 mod freshness;
 mod orders;
 mod samples;
@@ -270,6 +271,7 @@ impl Conversation {
         self.orders.keep(|asker| asker == Asker::Question);
         self.driving.forget_actions();
         self.stand(now, Code::LinkLost);
+        self.stand_commissioned(now);
     }
 
     /// Time has passed. Call this before everything that has come since, at least every 20 ms.
@@ -527,7 +529,7 @@ impl Conversation {
             return;
         }
         let silent = now.ns.saturating_sub(self.heard_ns);
-        let (most, period) = match self.driving.is_running() {
+        let (most, period) = match self.driving.is_running() || self.moves_commissioned() {
             true => (SILENT_MOVING, SIGN_MOVING),
             false => (SILENT, SIGN),
         };

@@ -3,7 +3,7 @@
 use lager_lines::conversation::RobotLine;
 use lager_lines::extension::Report;
 use lager_operator::Act;
-use lager_orders::Reason;
+use lager_orders::{Commission, Reason};
 use lager_topics::{SteeringOrder, WarehouseMap};
 
 /// Something to do, in the order of the decisions.
@@ -24,4 +24,11 @@ pub enum Effect {
     Steer(SteeringOrder),
     /// Stop the robot by its stop word.
     Stop,
+    /// Tell this to the commissioning of the robot, or begin one.
+    Commission {
+        /// When it was given, in ns of `CLOCK_MONOTONIC`.
+        given_ns: u64,
+        /// What a person says.
+        said: Commission,
+    },
 }

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use lager_home::Watched;
-use lager_lines::extension::Finding;
+use lager_lines::extension::{Commissioning, Finding, FoundOut, KeptLine};
 use lager_operator::Seen;
 use lager_orders::Mode;
 use lager_stop::Stop;
@@ -35,6 +35,19 @@ pub(crate) struct Known {
     pub(crate) services: Vec<Watched>,
     /// The warehouse that this process or an earlier one has published.
     pub(crate) map: Option<Box<WarehouseMap>>,
+    pub(crate) commission: Commissioned,
+}
+
+/// What the commissioning of the robot tells.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Commissioned {
+    /// One is at work.
+    pub(crate) is_at_work: bool,
+    /// How far it is, or how the last one has ended.
+    pub(crate) how: Box<Commissioning>,
+    pub(crate) found: FoundOut,
+    /// The description that it has saved.
+    pub(crate) kept: Vec<KeptLine>,
 }
 
 /// When both wheels stood after the stop in force.

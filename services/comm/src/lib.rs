@@ -4,6 +4,7 @@
 //! - [`Conversation`]: which questions comm asks, what it does with answers and actions, and what
 //!   it tells. It is a pure state machine over lines and samples.
 //! - [`run`]: its shell between a socket and the bus.
+//! - [`Commissioner`]: the program that it starts when a person sets the robot up.
 //! - [`secrets_at`]: the file with the secret by which robot and station recognise each other.
 //!
 //! It has no more rights than a person at the robot: it orders, presses and steers as an operator,
@@ -13,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 mod asking;
+mod commissioner;
 mod conversation;
 mod effect;
 mod health;
@@ -29,6 +31,7 @@ mod shell;
 mod speech;
 mod telling;
 
+pub use commissioner::Commissioner;
 pub use conversation::Conversation;
 pub use effect::Effect;
 pub use known::{Machine, Senses};

@@ -14,7 +14,7 @@ use lager_battery::Pack;
 use lager_home::{Clock, Home, UnitName};
 use lager_lines::{MAX_LINE, Name, to_line};
 use lager_operator::Act;
-use lager_orders::{Code, Moment};
+use lager_orders::{Code, Commission, Moment, Reason};
 use lager_ports::{
     Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, Sample, SendError, Subscriber,
 };
@@ -28,6 +28,7 @@ use lager_topics::{
 use lager_wake::{Policy, Shutdown, Waiter, Watchdog};
 
 use crate::asking::Asking;
+use crate::commissioner::{self, Commissioner};
 use crate::conversation::Conversation;
 use crate::effect::Effect;
 use crate::known::{Machine, Senses};
@@ -64,6 +65,8 @@ pub struct CommConfig {
     pub pack: Pack,
     /// Whether to take over the map of an earlier comm.
     pub resume: bool,
+    /// The program that commissions the robot; without one nobody does by a page.
+    pub commissioner: Option<Commissioner>,
     /// Finds out how this machine is, in well under a millisecond.
     pub machine: fn() -> Machine,
 }
@@ -144,6 +147,9 @@ struct Shell {
     commands: Publisher<SteeringCommand>,
     bridge: Asking<BridgeRequest>,
     world: Asking<WorldRequest>,
+    commissioner: Option<Commissioner>,
+    /// The commissioning that is at work.
+    commissions: Option<commissioner::Process>,
     complaints: u32,
 }
 
@@ -208,6 +214,8 @@ impl Shell {
             orders: opening.publisher()?,
             inputs: opening.publisher()?,
             commands: opening.publisher()?,
+            commissioner: config.commissioner.clone(),
+            commissions: None,
             complaints: 0,
         };
         if let Some(map) = kept {
@@ -231,6 +239,7 @@ impl Shell {
         self.look(now);
         self.take_samples(now);
         self.take_answers();
+        self.take_commission();
         self.take_lines(now);
         self.act();
         self.link.write();
@@ -332,6 +341,45 @@ impl Shell {
         }
     }
 
+    /// Takes what the commissioning tells.
+    fn take_commission(&mut self) {
+        while let Some(news) = self.commissions.as_mut().and_then(|process| process.next()) {
+            match news {
+                commissioner::News::Told(report) => self.conversation.commission_told(report),
+                commissioner::News::Over => {
+                    if let Some(process) = self.commissions.take() {
+                        process.reap();
+                    }
+                    self.conversation
+                        .commission_over(Code::CommissionBroken.into());
+                }
+            }
+        }
+    }
+
+    /// Says something to the commissioning, or begins one.
+    fn commission(&mut self, given_ns: u64, said: Commission) {
+        if let (Some(process), _) = (&mut self.commissions, said) {
+            return process.tell(given_ns, said);
+        }
+        let is_undo = match said {
+            Commission::Begin => false,
+            Commission::Undo => true,
+            // It has ended meanwhile.
+            _ => return,
+        };
+        let started = match &self.commissioner {
+            Some(wanted) => commissioner::Process::start(wanted, is_undo, self.waiter.ringer()),
+            None => Err(std::io::ErrorKind::NotFound.into()),
+        };
+        match started {
+            Ok(process) => self.commissions = Some(process),
+            Err(error) => self
+                .conversation
+                .commission_over(Reason::new(Code::Misread, &[&error])),
+        }
+    }
+
     /// Takes what has come over the link. It passes on all lines at once, so that a stop among them
     /// goes first.
     fn take_lines(&mut self, now: Moment) {
@@ -397,6 +445,7 @@ impl Shell {
                     let sent = self.commands.send(Cause::OWN, order);
                     self.check(sent);
                 }
+                Effect::Commission { given_ns, said } => self.commission(given_ns, said),
                 Effect::Stop => {
                     if let Err(error) =
                         StopWord::set(&self.stop_word, Role::Comm, StopCause::Ordered)

@@ -41,6 +41,10 @@ pub(crate) struct Telling {
     obstacles: Option<Report>,
     gone: Option<Report>,
     sensors: Option<Report>,
+    commission: Option<Report>,
+    found: Option<Report>,
+    /// The lines of the saved description that were told.
+    kept: usize,
     /// The counts at the last report of the latency.
     latency: Durations,
 }
@@ -98,18 +102,32 @@ impl Telling {
             (&mut self.gone, known.queue.as_ref().map(gone)),
             (&mut self.sensors, known.health.as_ref().and_then(sensors)),
         ];
+        let commission = &known.commission;
+        let found = Report::Found(commission.found.clone());
+        let lists = lists.into_iter().chain([
+            (
+                &mut self.commission,
+                Some(Report::Commission(commission.how.clone())),
+            ),
+            (&mut self.found, Some(found)),
+        ]);
         for (told, list) in lists {
             if list.is_some() && *told != list {
                 told.clone_from(&list);
                 reports.extend(list);
             }
         }
+        // A further description begins with a first line again.
+        self.kept = self.kept.min(commission.kept.len());
+        let untold = commission.kept.iter().skip(self.kept);
+        reports.extend(untold.cloned().map(Report::Kept));
+        self.kept = commission.kept.len();
         reports
     }
 }
 
 /// The kinds of reports that replace an earlier one of their kind.
-pub(crate) const KINDS: usize = 10;
+pub(crate) const KINDS: usize = 12;
 
 /// The kind of a report, the first to be sent first; `None` for reports that all count.
 pub(crate) const fn kind(report: &Report) -> Option<usize> {
@@ -124,13 +142,16 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         Report::Obstacles(_) => Some(7),
         Report::Gone(_) => Some(8),
         Report::Health(_) => Some(9),
+        Report::Commission(_) => Some(10),
+        Report::Found(_) => Some(11),
         Report::Stopped { .. }
         | Report::Done { .. }
         | Report::Refused { .. }
         | Report::Event(_)
         | Report::Past { .. }
         | Report::Thinks(_)
-        | Report::Because(_) => None,
+        | Report::Because(_)
+        | Report::Kept(_) => None,
     }
 }
 

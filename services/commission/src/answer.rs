@@ -60,8 +60,9 @@ impl Answer {
             }
         }
         match takes {
-            // An empty line comes again and again while a person holds the enter key.
-            Takes::Hold if line.is_empty() => Ok(Self::Hold),
+            // An empty line comes again and again while a person holds the enter key, and the word
+            // while he holds a button of a page.
+            Takes::Hold if line.is_empty() || line == "hold" => Ok(Self::Hold),
             Takes::Yes | Takes::Hold => Err(unfit()),
             Takes::Number => number(&line).map(Self::Number).ok_or_else(unfit),
             Takes::Ways => {
@@ -118,7 +119,9 @@ mod tests {
             assert!(ways(wrong).is_err(), "{wrong}");
         }
         assert!(Answer::read("12", Takes::Yes).is_err());
-        assert_eq!(Answer::read("", Takes::Hold), Ok(Answer::Hold));
+        for held in ["", "hold"] {
+            assert_eq!(Answer::read(held, Takes::Hold), Ok(Answer::Hold));
+        }
         assert_eq!(Answer::read("ja", Takes::Hold), Ok(Answer::Yes));
         for wrong in ["", "hold"] {
             assert!(Answer::read(wrong, Takes::Yes).is_err());

@@ -4,7 +4,8 @@
 //! - [`Commissioning`]: the state machine. Time, samples and answers go in; [`Effect`]s come out.
 //! - [`Answer`]: what a person may say.
 //! - [`Said`]: a sentence of `sentences.txt`, in English and in Swedish. The table is apart from that
-//!   of orders, because pages are told all of that one, and no page shows these.
+//!   of orders, because every page is told all of that one, and few show these.
+//! - [`Results`]: what has been found out, as a page lists it.
 //!
 //! It opens no port, reads no clock and writes no file.
 //!
@@ -20,6 +21,7 @@ mod machine;
 mod range;
 mod recent;
 mod step;
+mod told;
 mod wheels;
 mod words;
 
@@ -27,4 +29,5 @@ pub use answer::{Answer, Way};
 pub use arm::Joint;
 pub use machine::{Built, Commissioning, Effect};
 pub use step::{Question, Step, Takes};
+pub use told::Results;
 pub use words::{Said, sentences};

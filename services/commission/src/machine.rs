@@ -126,6 +126,8 @@ pub struct Commissioning {
     original: Built,
     /// What the boards shall obey.
     wanted: RobotProfile,
+    /// Something was told, so that somebody has to take it back.
+    is_tried: bool,
     /// What they obey of it; `None` if nobody knows.
     told: [Option<RobotProfile>; TOLD.len()],
     /// What the bridge was asked to tell, and has not answered yet.
@@ -162,6 +164,7 @@ impl Commissioning {
             before: [built; Step::ALL.len()],
             original: built,
             wanted: built.robot,
+            is_tried: false,
             told: [None; TOLD.len()],
             under_way: None,
             description: None,
@@ -424,8 +427,7 @@ impl Commissioning {
         self.built = self.original;
         self.is_leaving = true;
         self.state = State::Over;
-        // Without a first answer nothing was tried.
-        if self.told != [None; TOLD.len()] {
+        if self.is_tried {
             self.tell(now, self.built.robot);
         }
     }
@@ -433,6 +435,18 @@ impl Commissioning {
     /// The arm that the steering board obeys.
     fn told_arm(&self) -> Option<lager_wire::ArmProfile> {
         self.told[Part::Arm as usize].map(|told| told.arm)
+    }
+
+    /// Nobody is there any more: the robot stands, the boards obey what they obeyed before, and a
+    /// person who comes back begins with the boards. What was found out is kept.
+    pub fn rest(&mut self, now: Moment) {
+        if self.state == State::Over || self.is_leaving {
+            return;
+        }
+        self.fall_back(now, "nobody_there");
+        if self.is_tried {
+            self.tell(now, self.original.robot);
+        }
     }
 
     /// `link/health`, if it is new.
@@ -511,6 +525,7 @@ impl Commissioning {
         };
         if let Some(part) = TOLD.into_iter().find(is_open) {
             self.under_way = Some(self.wanted);
+            self.is_tried = true;
             self.effects.push(Effect::Describe(part, self.wanted));
             self.state = State::Tells { since, due: None };
             return;
@@ -549,6 +564,8 @@ impl Commissioning {
     fn fall_back(&mut self, now: Moment, why: &'static str) {
         self.stand(now);
         self.said.push(Said::of("ended", [("why", why.into())]));
+        // Whether a trial still holds, nobody knows.
+        self.told = [None; TOLD.len()];
         self.built = self.before[self.step as usize];
         self.before[Step::Boards as usize] = self.built;
         self.step = Step::Boards;

@@ -167,7 +167,7 @@ impl Question {
         Said::from(self.sentence()).text(language)
     }
 
-    const fn sentence(self) -> &'static str {
+    pub(crate) const fn sentence(self) -> &'static str {
         match self {
             Self::Boards => "ask_boards",
             Self::LineSway => "ask_line_sway",

@@ -1,10 +1,13 @@
 //! `lager comm`: starts the communication unit, and guards its calls into the bus.
 
+use std::ffi::OsString;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use lager_comm::CommConfig;
+use lager_comm::{CommConfig, Commissioner};
 use lager_lines::Name;
+use lager_supervisor::runtime_folder::RuntimeFolder;
 use lager_supervisor::signals;
 use lager_wake::{GivenUp, Shutdown, Watchdog};
 
@@ -38,9 +41,26 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
         link_lost: joined.comm.link_lost,
         pack: joined.pack(),
         resume: args.service.resume,
+        commissioner: commissioner(&joined)?,
         machine: doctor::soon::machine,
     };
     Ok((joined, wanted))
+}
+
+/// This very program, with the lines of a station; `None` beside no robot.
+fn commissioner(config: &Config) -> Result<Option<Commissioner>> {
+    let Some(running) = RuntimeFolder::running(&config.bus()?)? else {
+        return Ok(None);
+    };
+    let words = ["commission", "--lines"].map(OsString::from);
+    Ok(Some(Commissioner {
+        // Also when its file has been replaced meanwhile.
+        program: PathBuf::from("/proc/self/exe"),
+        arguments: [OsString::from("--config"), running.into()]
+            .into_iter()
+            .chain(words)
+            .collect(),
+    }))
 }
 
 /// Ends this process when a call into the bus hangs, with a sentence that names the call. `up`

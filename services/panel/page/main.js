@@ -90,6 +90,11 @@ const editor = new Later(
   (query) => (query ? import(`./setup/editor.js${query}`) : import("./setup/editor.js")),
   ({ Editor }) => new Editor(link, { map, robot, isOpen: isSetUp, drawn: drawWarehouse }),
 );
+const commission = new Later(
+  at("commission"),
+  (query) => (query ? import(`./commission/commission.js${query}`) : import("./commission/commission.js")),
+  ({ Commission }) => new Commission(at("commission"), link),
+);
 const line = new Later(
   at("line"),
   (query) => (query ? import(`./line/line.js${query}`) : import("./line/line.js")),
@@ -191,16 +196,20 @@ for (const tab of every("[role=tab]", HTMLButtonElement)) {
   });
 }
 
-/** @param {HTMLElement} tab */
+at("commission-open").onclick = () => show(at("commission-open"));
+
+/** @param {HTMLElement} tab or what opens a view that belongs to one */
 function show(tab) {
   const wasSetUp = isSetUp();
   document.body.dataset.view = tab.getAttribute("aria-controls") ?? "";
+  const isOpener = tab === at("commission-open");
   for (const other of every("[role=tab]", HTMLButtonElement)) {
-    const chosen = other === tab;
+    const chosen = other === (isOpener ? at("tab-setup") : tab);
     other.setAttribute("aria-selected", String(chosen));
     other.tabIndex = chosen ? 0 : -1;
-    document.getElementById(other.getAttribute("aria-controls") ?? "")?.toggleAttribute("hidden", !chosen);
+    document.getElementById(other.getAttribute("aria-controls") ?? "")?.toggleAttribute("hidden", other !== tab);
   }
+  at("commission").toggleAttribute("hidden", !isOpener);
   driving.letGo();
   // Who drives or sets up sees what is now.
   if (tab.id === "tab-drive" || isSetUp()) moment.back();
@@ -331,9 +340,10 @@ function drawRest(shown, time, seen, then) {
   driving.draw();
   strips.draw(seen, then);
   timeLine.draw(shown);
-  at("coming").toggleAttribute("hidden", ![signals, editor, line, health].some(({ view, state }) => !view.hidden && state));
+  at("coming").toggleAttribute("hidden", ![signals, editor, commission, line, health].some(({ view, state }) => !view.hidden && state));
   signals.open(coming)?.draw(shown, time);
   editor.open(coming)?.draw();
+  commission.open(coming)?.draw(shown, time);
   line.open(coming)?.draw(shown);
   asked.draw(shown);
   byHand.draw(shown);

@@ -44,9 +44,10 @@ static BUNDLES: LazyLock<Vec<(&str, Bundle)>> = LazyLock::new(|| {
 });
 /// What a page fetches when somebody opens it: a script of its own. That of the signals has a library
 /// of plots.
-const LATER: [&str; 5] = [
+const LATER: [&str; 6] = [
     "signals/signals.js",
     "setup/editor.js",
+    "commission/commission.js",
     "line/line.js",
     "health/health.js",
     "log/recording.js",
@@ -54,12 +55,15 @@ const LATER: [&str; 5] = [
 /// The words of each language. A page fetches those that its reader wants.
 const LANGUAGES: [&str; 2] = ["words/en.js", "words/sv.js"];
 
+/// How such a view looks, which it fetches itself.
+const LATER_LOOK: &str = "commission/commission.css";
+
 /// How the page looks: the parts of each folder, and then what holds for all of it, the rules for
 /// small and for large screens included. Comments, and what only sets lines apart, are left out.
 static LOOK: LazyLock<String> = LazyLock::new(|| {
     let (of_all, of_parts): (Vec<_>, Vec<_>) = FILES
         .iter()
-        .filter(|(name, _)| name.ends_with(".css"))
+        .filter(|(name, _)| name.ends_with(".css") && *name != LATER_LOOK)
         .partition(|(name, _)| !name.contains('/'));
     let sheets = of_parts.iter().chain(&of_all);
     let all: String = sheets.map(|(_, content)| *content).collect();
@@ -108,6 +112,20 @@ static WORDS: LazyLock<[String; 2]> = LazyLock::new(|| {
     })
 });
 
+/// The sentences of a commissioning in both languages, as a script: few pages fetch it.
+static COMMISSION: LazyLock<String> = LazyLock::new(|| {
+    let table = |text: fn(Sentence) -> &'static str| {
+        let line = |sentence: Sentence| {
+            let (name, said) = (sentence.name, serde_json::json!(text(sentence)));
+            format!("{name}: {said},")
+        };
+        lager_commission::sentences().map(line).collect::<String>()
+    };
+    let english = table(|sentence| sentence.english);
+    let swedish = table(|sentence| sentence.swedish);
+    format!("export const SENTENCES = {{ en: {{{english}}}, sv: {{{swedish}}} }};\n")
+});
+
 /// The limits of a floor, as a script: the page has no others.
 static LIMITS: LazyLock<String> = LazyLock::new(|| {
     let limits = serde_json::json!({
@@ -123,7 +141,7 @@ static LIMITS: LazyLock<String> = LazyLock::new(|| {
 /// opened before the program was replaced has another one.
 pub(crate) static EDITION: LazyLock<String> = LazyLock::new(|| {
     let mut hasher = DefaultHasher::new();
-    (FILES, &*WORDS, &*LIMITS).hash(&mut hasher);
+    (FILES, &*WORDS, &*LIMITS, &*COMMISSION).hash(&mut hasher);
     format!("{:016x}", hasher.finish())
 });
 
@@ -131,6 +149,9 @@ pub(crate) static EDITION: LazyLock<String> = LazyLock::new(|| {
 fn written(name: &str) -> Option<&'static str> {
     if name == "setup/limits.js" {
         return Some(&LIMITS);
+    }
+    if name == "commission/sentences.js" {
+        return Some(&COMMISSION);
     }
     let found = FILES.iter().find(|(file, _)| *file == name)?;
     Some(found.1)
@@ -314,6 +335,27 @@ mod tests {
             .filter_map(|part| part.rsplit([' ', '\n', '{', ',']).next())
             .map(|key| key.trim_matches('"'))
             .collect()
+    }
+
+    #[test]
+    fn each_word_of_the_commissioning_s_page_is_said_by_it() {
+        let scripts = FILES
+            .iter()
+            .filter(|(name, _)| name.starts_with("commission/"));
+        let scripts: String = scripts.map(|(_, content)| *content).collect();
+        let words = lager_commission::sentences()
+            .filter_map(|sentence| sentence.name.strip_prefix("page_"));
+        let mut count = 0;
+        for word in words {
+            count += 1;
+            // These stand in the place of a question.
+            let is_said = word.starts_with("ask_")
+                || [format!("\"{word}\""), format!("\"page_{word}\"")]
+                    .iter()
+                    .any(|quoted| scripts.contains(quoted));
+            assert!(is_said, "nobody says page_{word}");
+        }
+        assert!(count > 20, "{count}");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::extension::Spelled;
-use lager_orders::{Action, Code, Late, Mode, Reason};
+use lager_orders::{Action, Code, Commission, Late, Mode, Reason};
 use lager_plant::Warehouse;
 use lager_station::{
     Awaited, Doing, Driver, Given, History, LastTold, Reply, Saving, Subscription, Uses, View,
@@ -277,7 +277,7 @@ impl Visit {
         let driver = self.wheels.get(robot);
         let late = action.late;
         let asked = match (action.what, driver) {
-            (Action::Drive { .. } | Action::Arm(_), None) => {
+            (Action::Drive { .. } | Action::Arm(_) | Action::Commission(_), None) => {
                 return self.refuse(number, Code::NotDriver);
             }
             // Its lease is the station's.
@@ -297,8 +297,13 @@ impl Visit {
             Ok(awaited) => self.asked.push((number, awaited)),
             Err(why) => return self.refuse(number, &why),
         }
-        // What is held, and steps, would be all that there is to read.
-        if !matches!(action.what, Action::Drive { .. } | Action::Arm(_)) {
+        // What is held, steps and answers would be all that there is to read.
+        let is_many = match action.what {
+            Action::Drive { .. } | Action::Arm(_) => true,
+            Action::Commission(said) => !matches!(said, Commission::Begin | Commission::Undo),
+            _ => false,
+        };
+        if !is_many {
             self.note(robot, &Spelled(&action.what).to_string());
         }
     }

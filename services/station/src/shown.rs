@@ -5,10 +5,14 @@ use std::time::Duration;
 use lager_floor::{Node, Place, ProductId};
 use lager_lines::Text;
 use lager_lines::extension::{
-    Block, Event, Health, Latency, Listed, Queued, Report, State, Thinks, TruePose,
+    Block, Commissioning, Event, FoundOut, Health, KeptLine, Latency, Listed, Queued, Report,
+    State, Thinks, TruePose,
 };
 use lager_orders::Reason;
 use lager_wire::LineReading;
+
+/// More lines than a description has.
+const MOST_KEPT: usize = 1_000;
 
 /// Something that a robot has told, and when.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +54,12 @@ pub struct Shown {
     pub sensors: Option<Dated<[LineReading; 11]>>,
     /// How its machine, its services and its boards are, once a second.
     pub health: Option<Dated<Box<Health>>>,
+    /// How far the commissioning is, or how the last one has ended.
+    pub commission: Option<Dated<Box<Commissioning>>>,
+    /// What the commissioning has found out.
+    pub found: Option<Dated<FoundOut>>,
+    /// The description that the commissioning has saved, as far as it was told.
+    pub kept: Option<Dated<Vec<KeptLine>>>,
 }
 
 /// What became of an action or of a stop.
@@ -139,7 +149,7 @@ impl Saying {
 /// What somebody has been told of a robot's [`Shown`], as the times of the last reports.
 #[derive(Clone, Debug, Default)]
 pub struct LastTold {
-    at: [Option<Duration>; 10],
+    at: [Option<Duration>; 13],
 }
 
 impl LastTold {
@@ -171,6 +181,14 @@ impl LastTold {
             obstacles => Report::Obstacles,
             gone => Report::Gone,
             health => Report::Health,
+            commission => Report::Commission,
+            found => Report::Found,
+        }
+        if let (Some(last), Some(kept)) = (last.next(), &shown.kept)
+            && last.replace(kept.at) != Some(kept.at)
+        {
+            let lines = kept.value.iter().cloned();
+            newer.extend(lines.map(|line| (kept.at, Report::Kept(line))));
         }
         newer
     }
@@ -191,6 +209,16 @@ impl Shown {
             Report::Sensors(value) => self.sensors = Some(Dated { value, at }),
             Report::Health(value) => self.health = Some(Dated { value, at }),
             Report::Obstacles(value) => self.obstacles = Some(Dated { value, at }),
+            Report::Commission(value) => self.commission = Some(Dated { value, at }),
+            Report::Found(value) => self.found = Some(Dated { value, at }),
+            Report::Kept(line) => {
+                let before = self.kept.take().map(|kept| kept.value);
+                let mut value = before.filter(|_| line.number > 1).unwrap_or_default();
+                if value.len() < MOST_KEPT {
+                    value.push(line);
+                }
+                self.kept = Some(Dated { value, at });
+            }
             Report::Past { ago_ms, report } => {
                 let ago = Duration::from_millis(ago_ms);
                 let told = Box::new(self.take(*report, at)?);

@@ -5,7 +5,7 @@
 use core::fmt;
 
 use lager_floor::{Heading, Node, ProductId};
-use lager_orders::{Mode, Pick};
+use lager_orders::{Mode, Pick, Reason};
 use lager_wire::{Binary, LineBits};
 
 use crate::floor::product;
@@ -29,7 +29,7 @@ macro_rules! fields {
             pub(super) fn read(
                 reader: &mut $crate::reader::Reader<'_>,
             ) -> Result<Self, $crate::misread::Misread> {
-                use $crate::extension::fields::Value as _;
+                use $crate::extension::fields::Value;
 
                 let mut read = Self::default();
                 while !reader.ahead().text.is_empty() {
@@ -42,7 +42,7 @@ macro_rules! fields {
                             if read.$key.is_some() {
                                 return Err(key.misread("a field that has not been given yet"));
                             }
-                            read.$key = Some(value.read($wanted, <$type>::of)?);
+                            read.$key = Some(value.read($wanted, <$type as Value>::of)?);
                         } )*
                         _ => {}
                     }
@@ -225,6 +225,26 @@ impl Value for ProductId {
 
     fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{self}")
+    }
+}
+
+/// In one word: a blank is written `%20`, `%` and `=` `%25` and `%3D`.
+impl Value for Reason {
+    fn of(text: &str) -> Option<Self> {
+        let text = text.replace("%20", " ").replace("%3D", "=");
+        (!text.is_empty()).then(|| Self::read(&text.replace("%25", "%")))
+    }
+
+    fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for letter in self.as_str().chars() {
+            match letter {
+                '%' => formatter.write_str("%25")?,
+                '=' => formatter.write_str("%3D")?,
+                ' ' | '\t' | '\r' | '\n' => formatter.write_str("%20")?,
+                letter => write!(formatter, "{letter}")?,
+            }
+        }
+        Ok(())
     }
 }
 

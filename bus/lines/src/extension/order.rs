@@ -25,6 +25,7 @@
 //!            | horn                    the robot sounds its horn: it says so in a thought
 //!            | obstacle put <edge>     in a simulated world
 //!            | obstacle take <edge>
+//!            | commission <said>       to the commissioning of the robot; see `commission.rs`
 //! <order>  ::= <int>                   0 to 4294967295, chosen by the station; 0 is refused
 //! <mode>   ::= manual | autonomous
 //! <speed>  ::= slow | middle | full     full if it is left out; 2, 4, 6 and 7 alone have one
@@ -38,6 +39,7 @@ use lager_orders::{Action, LeaseMs, Mode, Pick, Put};
 use lager_wire::{Callsign, OperatorCommand, Speed};
 use thiserror::Error;
 
+use super::commission;
 use super::fields::Value as _;
 use crate::command::{Code, CommandError, read_arm, read_wheels};
 use crate::floor::{Spelled as _, Words};
@@ -228,9 +230,11 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
             })?,
             way: Place::read(&mut reader)?,
         },
+        "commission" => Action::Commission(commission::read(&mut reader)?),
         _ => {
             let wanted = "one of order, cancel, first, up, clear, back, mode, resume, reset, place, \
-                          picked, pick, drive, arm, gains, calibrate, restart, horn and obstacle";
+                          picked, pick, drive, arm, gains, calibrate, restart, horn, obstacle and \
+                          commission";
             return Err(word.misread(wanted).into());
         }
     };
@@ -333,6 +337,10 @@ impl fmt::Display for Spelled<'_> {
             Action::Horn => formatter.write_str("horn"),
             Action::Obstacle { put, way } => {
                 write!(formatter, "obstacle {} {}", put.as_str(), Words(way))
+            }
+            Action::Commission(said) => {
+                formatter.write_str("commission ")?;
+                commission::put(*said, formatter)
             }
         }
     }

@@ -6,6 +6,7 @@ use lager_floor::{Node, Place, ProductId};
 use lager_orders::{EventKind, Reason};
 use lager_wire::LineReading;
 
+use super::commission::{Commissioning, FoundOut, KeptLine};
 use super::fields::Degrees;
 use super::health::Health;
 use super::listed::{Block, Listed, Queued};
@@ -73,6 +74,12 @@ pub enum Report {
     Sensors([LineReading; 11]),
     /// How its machine, its services and its boards are.
     Health(Box<Health>),
+    /// How far the commissioning is.
+    Commission(Box<Commissioning>),
+    /// What the commissioning has found out.
+    Found(FoundOut),
+    /// A line of the description that it has saved.
+    Kept(KeptLine),
 }
 
 /// What has happened on a mission (C8).
@@ -242,6 +249,11 @@ impl Report {
                 |reader: &mut Reader<'_>| Ok(Self::Latency(Box::new(Latency::read(reader)?)))
             }
             "truth" => |reader: &mut Reader<'_>| TruePose::read(reader).map(Self::Truth),
+            "commission" => |reader: &mut Reader<'_>| {
+                Ok(Self::Commission(Box::new(Commissioning::read(reader)?)))
+            },
+            "found" => |reader: &mut Reader<'_>| FoundOut::read(reader).map(Self::Found),
+            "kept" => |reader: &mut Reader<'_>| KeptLine::read(reader).map(Self::Kept),
             "sensors" => |reader: &mut Reader<'_>| read_sensors(reader).map(Self::Sensors),
             _ => return None,
         };
@@ -390,6 +402,9 @@ impl fmt::Display for Report {
             Self::Latency(latency) => write!(formatter, "latency {latency}"),
             Self::Health(health) => write!(formatter, "health{health}"),
             Self::Truth(truth) => write!(formatter, "truth {truth}"),
+            Self::Commission(how) => write!(formatter, "commission{how}"),
+            Self::Found(found) => write!(formatter, "found {found}"),
+            Self::Kept(line) => write!(formatter, "kept {line}"),
             Self::Sensors(sensors) => {
                 formatter.write_str("sensors")?;
                 sensors.iter().try_for_each(|sensor| {

@@ -3,13 +3,14 @@
 use lager_floor::{Grid, Heading, Node, Place, Product, ProductId, SideLength};
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Block, Degrees, Event, Finding, Findings, Happened, Health, Hello, Latency, Listed, Loads,
-    Order, Queued, Release, Report, Service, Services, Servos, State, Thinks, TruePose,
+    Block, Commissioning, Degrees, Event, Finding, Findings, FoundOut, Happened, Health, Hello,
+    KeptLine, Latency, Listed, Loads, Order, Queued, Release, Report, Service, Services, Servos,
+    State, Thinks, TruePose,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
 use lager_lines::{Name, Products, Text, to_line};
-use lager_orders::{Action, LeaseMs, Mode, Pick, Put, Reason, Wheels};
+use lager_orders::{Action, AnswerWord, Commission, LeaseMs, Mode, Pick, Put, Reason, Wheels};
 use lager_wire::{Binary, Callsign, LineBits, LineReading, OperatorArm, OperatorCommand, Speed};
 use proptest::option::of;
 use proptest::prelude::*;
@@ -132,7 +133,38 @@ fn action() -> impl Strategy<Value = Action> {
         of(product_id()).prop_map(|product| Action::Back { product }),
         (select(&[Put::Put, Put::Take]), way())
             .prop_map(|(put, way)| Action::Obstacle { put, way }),
+        commission().prop_map(Action::Commission),
     ]
+}
+
+fn commission() -> impl Strategy<Value = Commission> {
+    let plain = [
+        Commission::Begin,
+        Commission::Undo,
+        Commission::Here,
+        Commission::Stand,
+        Commission::Quit,
+    ];
+    let word = "[a-z0-9.,-]{1,16}".prop_map(|word| AnswerWord::new(&word).expect("a word"));
+    prop_oneof![
+        select(plain.to_vec()),
+        (any::<u32>(), word).prop_map(|(asked, word)| Commission::Answer { asked, word }),
+    ]
+}
+
+/// A sentence of a commissioning, which stands in one word of a line.
+fn said() -> impl Strategy<Value = Reason> {
+    "[a-z_]{1,12}( [a-z0-9%=/.]{1,12}){0,3}".prop_map(|said| Reason::read(&said))
+}
+
+prop_compose! {
+    fn commissioning()(
+        asked in of(any::<u32>()), step in of(name()), place in of(any::<u8>()),
+        steps in of(any::<u8>()), question in of(name()), takes in of(name()),
+        moves in of(any::<bool>()), shows in of(said()), why in of(said()), ended in of(said()),
+    ) -> Commissioning {
+        Commissioning { asked, step, place, steps, question, takes, moves, shows, why, ended }
+    }
 }
 
 fn order() -> impl Strategy<Value = Order> {
@@ -323,6 +355,14 @@ fn report() -> impl Strategy<Value = Report> {
                 let buckets = counts.try_into().expect("as many as there are buckets");
                 Report::Latency(Box::new(Latency { max_us, buckets }))
             }),
+        commissioning().prop_map(|how| Report::Commission(Box::new(how))),
+        prop::collection::vec((name(), said()), 0..40)
+            .prop_map(|found| Report::Found(FoundOut::new(&found))),
+        (any::<(u32, u32)>(), text()).prop_map(|((number, of), text)| Report::Kept(KeptLine {
+            number,
+            of,
+            text
+        })),
         any::<[(u8, u8, u8, bool); 11]>().prop_map(|read| {
             let mut sensors = [LineReading::default(); 11];
             for (sensor, (reading, lowest, highest, tells_apart)) in (0..).zip(read) {

@@ -3,6 +3,7 @@
 use lager_floor::Heading;
 
 use core::fmt;
+use core::time::Duration;
 
 use lager_orders::{Mode, Reason};
 use lager_sample::{Tag, coded, payload};
@@ -27,8 +28,10 @@ coded! {
         /// Let logic drive from the start. Answered `Done`, but without effect, if somebody has set
         /// the mode since the robot was switched on.
         Begin = 4,
-        /// Tell a board how `part` of the robot is built, to try it: until this bridge ends, and its
-        /// successor tells what is configured. Answered when the board has taken `values` or not.
+        /// Tell a board how `part` of the robot is built, to try it: for `trial_ms` or, with 0, until
+        /// this bridge ends, and its successor tells what is configured. Answered when the board has
+        /// taken `values` or not. The same request again prolongs a trial; when its time is over, the
+        /// board is told what it was told before.
         Describe = 5,
         /// Restart `board`, while the robot stands. "Done" means that it was told to; `link/health`
         /// shows when it is up again.
@@ -123,16 +126,30 @@ payload! {
         /// What the board is told of it, value by value; the rest is 0.
         #[serde(with = "lager_sample::list")]
         pub values: [u16; MOST_VALUES] = [0; MOST_VALUES],
+        /// For how long a description is tried, in ms of robot time; 0 = until the bridge ends.
+        pub trial_ms: u16,
         /// The board to restart.
         pub board: Tag<Callsign>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 5],
+        pub reserved: [u8; 3],
     }
 }
 
 impl Ask {
-    /// The request to try how a part of `robot` is built.
+    /// How long a description is tried unless the request comes again, in robot time. Whoever tries
+    /// it may have died.
+    pub const TRIAL: Duration = Duration::from_secs(5);
+
+    /// The request to try how a part of `robot` is built, for [`Ask::TRIAL`].
+    pub fn try_out(part: Part, robot: &RobotProfile) -> Self {
+        Self {
+            trial_ms: Self::TRIAL.as_millis() as u16,
+            ..Self::describe(part, robot)
+        }
+    }
+
+    /// The request to tell how a part of `robot` is built, until the bridge ends.
     pub fn describe(part: Part, robot: &RobotProfile) -> Self {
         let mut ask = Self {
             kind: AskKind::Describe.into(),

@@ -105,17 +105,37 @@ impl BridgeCore {
             Some(Version::Original) => return Asked::Answered(Outcome::Refused),
             Some(version) => version,
         };
+        // Whoever tries a description goes on to try it while the robot moves by it.
+        if self.profiles.renew(now, part, ask) {
+            return Asked::Describing(part);
+        }
         let before = self.profiles.states();
         if self.may_move() || !self.profiles.describe(now, part, ask, version) {
             return Asked::Answered(Outcome::Refused);
         }
         self.heed_profiles(before);
+        self.described(part);
+        Asked::Describing(part)
+    }
+
+    /// Another description of a part is told.
+    fn described(&mut self, part: Part) {
         if part == Part::Arm {
             // Other servos may stand there now, and none of these has been heard.
             self.servos = ServoTable::default();
         }
         self.due.health = true;
-        Asked::Describing(part)
+    }
+
+    /// Takes back the descriptions that nobody tries any more, whatever the robot does: it stands
+    /// until its boards have accepted the former ones.
+    pub(super) fn take_back_trials(&mut self, now: Duration) {
+        let before = self.profiles.states();
+        let over = self.profiles.lapse(now);
+        if !over.is_empty() {
+            self.heed_profiles(before);
+            over.into_iter().for_each(|part| self.described(part));
+        }
     }
 
     /// Whether logic drives the robot now.

@@ -363,6 +363,7 @@ impl BridgeCore {
     /// Everything of this turn was handed in: lets time pass and does what is due.
     pub fn decide(&mut self, now: Duration) {
         self.wake(now);
+        self.take_back_trials(now);
         self.arbiter.advance(now);
         if self.is_stopped() {
             self.stopped_at.get_or_insert(now);

@@ -1,6 +1,6 @@
-//! What a board is told of its robot, value by value.
+//! How profiles reach their boards.
 
-use lager_wire::ResetCause;
+use lager_wire::{ResetCause, SettingKey};
 
 use super::*;
 
@@ -111,9 +111,13 @@ fn board(callsign: Callsign, rebooted: bool) -> Up {
 
 /// Answers everything that a board is asked; what it was asked.
 fn obey(profiles: &mut Profiles, callsign: Callsign) -> Vec<Setting> {
+    obey_at(profiles, callsign, ms(0))
+}
+
+fn obey_at(profiles: &mut Profiles, callsign: Callsign, now: Duration) -> Vec<Setting> {
     let mut told = Vec::new();
-    while let Some(setting) = profiles.poll(ms(0), callsign) {
-        assert!(profiles.answer(ms(0), &accepted(&setting)));
+    while let Some(setting) = profiles.poll(now, callsign) {
+        assert!(profiles.answer(now, &accepted(&setting)));
         told.push(setting);
     }
     told
@@ -289,4 +293,62 @@ fn a_board_that_never_answers_hears_of_its_arm_all_the_same() {
         (profiles.wheels(), profiles.arm()),
         (Gate::Shut, Gate::Shut)
     );
+}
+
+fn told(profiles: &Profiles) -> u32 {
+    let mut health = Health::default();
+    profiles.fill(&mut health);
+    health.description
+}
+
+/// Profiles of which the steering board's is tried from 0 s on, and the hash of the former ones.
+fn tried(ask: &Ask) -> (Profiles, u32) {
+    let mut profiles = Profiles::new(&RobotProfile::default(), None);
+    let before = told(&profiles);
+    assert!(
+        !profiles.renew(ms(0), Part::Steering, ask),
+        "nobody obeys it yet"
+    );
+    assert!(profiles.describe(ms(0), Part::Steering, ask, Version::One));
+    obey(&mut profiles, Callsign::Steering);
+    assert_ne!(told(&profiles), before);
+    (profiles, before)
+}
+
+#[test]
+fn a_description_that_nobody_tries_any_more_is_taken_back() {
+    let ask = Ask::try_out(Part::Steering, &swapped());
+    let (mut profiles, before) = tried(&ask);
+    assert!(profiles.renew(ms(4_000), Part::Steering, &ask));
+    assert_eq!(profiles.lapse(ms(8_999)), []);
+    assert_eq!(profiles.next_due(), Some(ms(9_000)));
+    assert_eq!(profiles.lapse(ms(9_000)), [Part::Steering]);
+    assert_eq!(told(&profiles), before);
+    assert_eq!(profiles.wheels(), Gate::Held, "the board has to take it");
+    obey_at(&mut profiles, Callsign::Steering, ms(9_000));
+    assert_eq!(profiles.wheels(), Gate::Open);
+    assert_eq!(profiles.lapse(ms(99_000)), []);
+}
+
+#[test]
+fn of_trials_one_after_the_other_that_is_taken_back_which_held_before_all() {
+    let ask = Ask::try_out(Part::Steering, &swapped());
+    let (mut profiles, before) = tried(&ask);
+    let mut third = swapped();
+    third.steering.wheels.left_reversed = true;
+    let ask = Ask::try_out(Part::Steering, &third);
+    assert!(profiles.describe(ms(2_000), Part::Steering, &ask, Version::One));
+    obey_at(&mut profiles, Callsign::Steering, ms(2_000));
+    assert_eq!(profiles.lapse(ms(6_999)), []);
+    assert_eq!(profiles.lapse(ms(7_000)), [Part::Steering]);
+    assert_eq!(told(&profiles), before);
+}
+
+#[test]
+fn what_is_told_for_good_after_a_trial_stays() {
+    let (mut profiles, before) = tried(&Ask::try_out(Part::Steering, &swapped()));
+    let ask = Ask::describe(Part::Steering, &swapped());
+    assert!(profiles.renew(ms(1_000), Part::Steering, &ask));
+    assert_eq!(profiles.lapse(ms(99_000)), []);
+    assert_ne!(told(&profiles), before);
 }

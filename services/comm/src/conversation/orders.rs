@@ -90,6 +90,9 @@ impl Conversation {
         number: u32,
         wanted: Action,
     ) -> Result<Begun, Reason> {
+        if let Action::Commission(said) = wanted {
+            return self.commission(now, late, said).map(|()| Begun::Done);
+        }
         let seen = self.known.seen();
         let asker = Asker::Action(number);
         let begun = self.orders.give(now, late, asker, wanted, &seen)?;

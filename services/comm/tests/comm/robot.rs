@@ -5,12 +5,12 @@ use core::time::Duration;
 use lager_battery::Pack;
 use lager_comm::{Conversation, Effect, LinkLost};
 use lager_lines::conversation::RobotLine;
-use lager_lines::extension::{Hello, Report};
+use lager_lines::extension::{Hello, Report, Spelled};
 use lager_lines::gag::Query;
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
 use lager_operator::Act;
-use lager_orders::{Mode, Moment, Reason};
+use lager_orders::{Action, Mode, Moment, Reason};
 use lager_topics::{
     Ask, Event, Health, Input, InputKind, NavigatorStatus, Order, OrderQueue, Origin, Phase,
     SteeringReport, WarehouseMap, WorldAsk,
@@ -180,6 +180,10 @@ impl Robot {
                         true => format!("[renews {}]", order.code),
                         false => format!("[steers {}]", order.code),
                     }
+                }
+                Effect::Commission { given_ns, said } => {
+                    self.given_ns = given_ns;
+                    format!("[{}]", Spelled(&Action::Commission(said)))
                 }
                 Effect::Stop => "[stops]".into(),
             });

@@ -193,12 +193,17 @@ impl Commissioning {
     fn ask_for(&mut self, question: Question, grows: bool) {
         self.arm.grows = grows;
         self.question = question;
-        let joint = self.present_joint();
+        self.said.extend(self.about());
+    }
+
+    /// What the present question is about, in words, if it alone does not say so.
+    pub fn about(&self) -> Option<Said> {
+        let (joint, grows) = self.joint()?;
         let values = [
             ("joint", joint.name().into()),
             ("way", joint.way(grows).into()),
         ];
-        self.said.push(Said::of("joint_way", values));
+        Some(Said::of("joint_way", values))
     }
 
     /// A person has shown both ends of a joint.

@@ -21,9 +21,13 @@ meter, something wide and light, a ruler, and room for the robot to turn. Each a
 The robot moves only after an answer to the question that announces this very movement, and stands at
 the next line that you type. A line that was typed before its question counts for nothing. Nothing is
 written before the last question is answered with yes. Then robot.toml has the new description, and
-logic uses it from the robot's next start on. Where LANG is Swedish, so are the questions.")]
+logic uses it from the robot's next start on. Where LANG is Swedish, so are the questions. In the
+panel, *Set up a robot* asks the same.")]
 pub struct CommissionArgs {
     /// Put back the description from before the last commissioning; needs no robot
     #[arg(long)]
     pub undo: bool,
+    /// Talk in the lines of a station, for comm
+    #[arg(long, hide = true)]
+    pub lines: bool,
 }

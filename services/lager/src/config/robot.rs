@@ -165,6 +165,31 @@ impl Config {
         Ok(path)
     }
 
+    /// The same without what the robot's file says. Of a section that stands in both files nobody
+    /// knows this any more, and it counts as the file's.
+    ///
+    /// # Errors
+    /// The file cannot be read any more.
+    pub fn undescribed(&self) -> Result<Self> {
+        let mut bare = self.clone();
+        let Some(path) = self.robot_file()?.filter(|path| path.exists()) else {
+            return Ok(bare);
+        };
+        let read = || format!("cannot read the robot's description {}", path.display());
+        let text = files::read(&path).with_context(read)?;
+        let file: RobotFile = toml::from_str(&text).with_context(read)?;
+        let usual = Self::default();
+        macro_rules! leave {
+            ($($section:ident),*) => { $(
+                if file.$section.is_some() {
+                    bare.$section = usual.$section;
+                }
+            )* };
+        }
+        leave!(wheels, line, distance, battery, arm, logic, buttons);
+        Ok(bare)
+    }
+
     /// Where the description of this robot is, or would be.
     pub fn place_of_description(&self) -> Result<PathBuf> {
         match (&self.robot, self.body) {

@@ -42,6 +42,8 @@ impl<K: Copy> Orders<K> {
             Action::Drive { wheels, lease } => {
                 return Ok(Begun::Steers(wheels.into(), Some(lease)));
             }
+            // It is for a process of its own.
+            Action::Commission(_) => return Err(Code::CommissionNone.into()),
             Action::Arm(step) => return Ok(Begun::Steers(OperatorCommand::Arm(step), None)),
             Action::Add { order: 0, .. } => return Err(Code::OrderZero.into()),
             Action::Add { order, .. } if queue.has(order) => {

@@ -9,7 +9,7 @@ import { put } from "../words/words.js";
  *
  * @type {Record<string, string>}
  */
-const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup", reload: "reload" };
+const REMEDIES = { reset: "where-ask", charge: "where-ask", hand: "picked", put_back: "do-back", arm: "tab-drive", calibrate: "tab-line", map: "tab-setup", describe: "commission-open", reload: "reload" };
 
 /**
  * Has a button do what helps, or hides it where this page has nothing that does.

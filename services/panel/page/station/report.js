@@ -56,6 +56,15 @@ const NOW = {
     // Without a frame measured there is no new figure.
     if (counted.length > 0) robot.latency = { p50: quantile(0.5, counted, longest), p99: quantile(0.99, counted, longest) };
   },
+  commission(robot, words) {
+    robot.commission = fields(words);
+  },
+  found(robot, [, ...words]) {
+    robot.found = groups(words, 2).map(([step = "", said = ""]) => [step, said]);
+  },
+  kept(robot, [number, , ...words]) {
+    robot.kept = [...(number === "1" ? [] : robot.kept), words.join(" ")];
+  },
   sensors(robot, words) {
     robot.sensors = groups(words, 4).map((sensor) => {
       const [reading = 0, lowest = 0, highest = 0, both] = sensor.map(Number);

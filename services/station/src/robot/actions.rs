@@ -5,13 +5,13 @@ use std::time::Duration;
 use lager_lines::conversation::StationLine;
 use lager_lines::extension::Order;
 use lager_orders::lease::{COMMAND, TooLate};
-use lager_orders::{Action, LeaseMs, Wheels};
+use lager_orders::{Action, Commission, LeaseMs, Wheels};
 use lager_wire::{OperatorArm, OperatorCommand};
 
 use super::{ActRefused, Robot};
 use crate::given::Given;
 use crate::shown::{Reply, Saying};
-use crate::wheel::Key;
+use crate::wheel::{Key, Wheel};
 
 /// [`COMMAND`] as a line says it.
 const COMMAND_LEASE: LeaseMs = LeaseMs::new(COMMAND.as_millis() as u16).expect("a time in ms");
@@ -31,6 +31,8 @@ impl Robot {
         let Given { what, late } = action.into();
         match what {
             Action::Drive { .. } | Action::Arm(_) => Err(ActRefused::NotDriver),
+            // It moves the robot, too, and whoever asks for this knows by whom.
+            Action::Commission(_) if self.wheel.driver().is_none() => Err(ActRefused::NotDriver),
             action => self.order(action, late),
         }
     }
@@ -91,7 +93,7 @@ impl Robot {
 
     /// The driver leaves. The robot stands if the driver's last command still turns its wheels.
     pub fn leave_wheel(&mut self, key: Key) -> Option<StationLine> {
-        self.wheel.leave(key).then(|| self.stand())?
+        self.without_driver(|wheel| wheel.leave(key))
     }
 
     /// Time has passed. A silent driver loses the wheel, and the robot has lost the actions that it
@@ -100,7 +102,7 @@ impl Robot {
         self.now = now;
         let lost = self.asked.lost(now, false);
         self.lose(lost);
-        self.wheel.lapse(now).then(|| self.stand())?
+        self.without_driver(|wheel| wheel.lapse(now))
     }
 
     /// Takes what the robot has said since the last call.
@@ -132,13 +134,32 @@ impl Robot {
         Ok((number, StationLine::Order(order)))
     }
 
+    /// Makes the robot stand if its driver goes. `leaves` returns whether the driver's last command
+    /// may still turn the wheels.
+    fn without_driver(&mut self, leaves: impl FnOnce(&mut Wheel) -> bool) -> Option<StationLine> {
+        let had_driver = self.wheel.driver().is_some();
+        let drives = leaves(&mut self.wheel);
+        let has_left = had_driver && self.wheel.driver().is_none();
+        let commissioned = has_left.then(|| self.stand_commissioned()).flatten();
+        commissioned.or_else(|| drives.then(|| self.stand())?)
+    }
+
     /// Makes the robot stand because its driver has gone. Nobody waits for the answer.
     fn stand(&mut self) -> Option<StationLine> {
+        let wheels = Wheels::new(OperatorCommand::Stop)?;
+        let lease = COMMAND_LEASE;
+        self.unanswered(Action::Drive { wheels, lease })
+    }
+
+    /// The same where it moves by a commissioning.
+    fn stand_commissioned(&mut self) -> Option<StationLine> {
+        let how = self.shown.commission.as_ref()?;
+        let moves = how.value.moves == Some(true);
+        moves.then(|| self.unanswered(Action::Commission(Commission::Stand)))?
+    }
+
+    fn unanswered(&mut self, action: Action) -> Option<StationLine> {
         self.hello.as_ref()?;
-        let action = Action::Drive {
-            wheels: Wheels::new(OperatorCommand::Stop)?,
-            lease: COMMAND_LEASE,
-        };
         let number = self.asked.number();
         let late_ms = 0;
         Some(StationLine::Order(Order::Do {

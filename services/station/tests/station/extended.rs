@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use lager_lines::Name;
 use lager_lines::command::{read_arm, read_wheels};
-use lager_orders::{Action, Mode, Wheels};
-use lager_station::{ActRefused, Output, Peer, Reply, Saying, Station, Wish, WishRefused};
+use lager_orders::{Action, Commission, Mode, Wheels};
+use lager_station::{ActRefused, Key, Output, Peer, Reply, Saying, Station, Wish, WishRefused};
 use lager_wire::{OperatorCommand, Speed};
 
 use crate::transcript::warehouse;
@@ -310,4 +310,57 @@ fn whoever_takes_the_wheel_from_a_gag_ends_what_it_gave() {
     said(&mut station);
     assert!(station.take_wheel(&r1(), "bo").is_ok());
     assert_eq!(said(&mut station), [""; 0]);
+}
+
+#[test]
+fn only_a_driver_sets_a_robot_up_and_what_moves_by_it_stands_when_he_leaves() {
+    let mut station = extended();
+    station.turn(at(1_000));
+    let begin = Action::Commission(Commission::Begin);
+    let refused = station.act(&r1(), begin).expect_err("nobody drives it");
+    assert_eq!(refused, WishRefused::Act(ActRefused::NotDriver));
+    let leaves: [&dyn Fn(&mut Station, Key); 2] = [
+        &|station, key| station.leave_wheel(&r1(), key),
+        // He has fallen silent.
+        &|station, _| station.turn(at(9_000)),
+    ];
+    for (moves, told) in [(0, false), (1, true)] {
+        for leave in leaves {
+            let mut station = extended();
+            station.turn(at(1_000));
+            let key = station.take_wheel(&r1(), "anna").expect("it is free");
+            station.act(&r1(), begin).expect("anna drives it");
+            assert_eq!(said(&mut station), ["do 1 commission begin"]);
+            let how = format!("commission asked=3 step=turn moves={moves}");
+            station.heard(LINK, Ok(&how));
+            leave(&mut station, key);
+            let said = said(&mut station);
+            assert_eq!(
+                said.contains(&"do 2 commission stand".into()),
+                told,
+                "{said:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_saved_description_is_shown_line_by_line_and_a_new_one_replaces_it() {
+    let mut station = extended();
+    let kept = |station: &Station| -> Vec<String> {
+        let shown = station.robot(&r1()).expect("it is here").shown();
+        let kept = shown.kept.as_ref().expect("lines").value.iter();
+        kept.map(|line| line.text.to_string()).collect()
+    };
+    for line in ["kept 1 2 [wheels]", "kept 2 2 swapped = true"] {
+        station.heard(LINK, Ok(line));
+    }
+    assert_eq!(kept(&station), ["[wheels]", "swapped = true"]);
+    station.heard(LINK, Ok("kept 1 1 [line]"));
+    assert_eq!(kept(&station), ["[line]"]);
+    // One that tells without end does not fill the station's memory.
+    for number in 2..3_000 {
+        station.heard(LINK, Ok(&format!("kept {number} 3000 x")));
+    }
+    assert_eq!(kept(&station).len(), 1_000);
 }

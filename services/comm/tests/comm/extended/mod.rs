@@ -1,6 +1,7 @@
 //! What only a station hears and orders that speaks the extension.
 
 mod asked;
+mod commissioned;
 mod driven;
 mod late;
 mod ordered;

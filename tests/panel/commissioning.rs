@@ -1,0 +1,583 @@
+//! A person who has only the browser finds out how a robot is built: *Set up a robot*. The robot is a
+//! simulated one that differs in everything, and the test is the person's hands and eyes.
+
+use std::f64::consts::TAU;
+use std::fs;
+use std::time::Duration;
+
+use lager_commission::sentences;
+use lager_floor::Heading;
+use lager_plant::{ArmBuild, Build, Ranger};
+use lager_ports::{Client, Subscriber};
+use lager_tests::{Domain, WATCHDOG, children, pid, wait_for};
+use lager_topics::{LinkHealth, Outcome, Truth, TruthPose, WorldAsk, WorldAskKind, WorldRequest};
+use rustix::process::{Signal, kill_process};
+use serde_json::json;
+
+use crate::browser::Page;
+use crate::keyboard::press;
+use crate::played::Stage;
+use crate::scene::Scene;
+
+/// How far the line sensors are moved to either side, in mm.
+const SWAY: i16 = 60;
+/// The length of the measured drive, in mm.
+const DRIVE: f64 = 600.0;
+
+/// A robot that differs in everything; its battery is not measured.
+fn other() -> (u64, Build) {
+    let builds = (1..).map(|seed| (seed, Build::drawn(seed)));
+    let mut other = builds.filter(|(_, build)| {
+        let parts = [build.swapped, build.dark_is_low, !build.divider];
+        parts == [true; 3] && build.reversed == [true, false] && build.ranger == Ranger::Gp2y0a02
+    });
+    other.next().expect("one in a hundred")
+}
+
+/// A robot that is built otherwise and that nobody has described, with its panel, and the words of
+/// its configuration for a command. Which servos its arm has stands there: this is found out
+/// elsewhere.
+fn unknown() -> (Scene, String) {
+    let (built, build) = other();
+    let domain = Domain::new();
+    let [config, robot] = ["lager.toml", "robot.toml"].map(|name| domain.folder().join(name));
+    fs::write(&robot, arm(&build.arm)).expect("a file");
+    let text = format!(
+        "robot = {:?}\n[simulator]\nbuilt = {built}\n",
+        robot.display().to_string()
+    );
+    fs::write(&config, text).expect("a file");
+    let config = config.display().to_string();
+    (Scene::on(domain, 1.0, &["--config", &config]), config)
+}
+
+/// What a person who knows the servos of the arm has written of them.
+fn arm(build: &ArmBuild) -> String {
+    let names = [
+        "base", "shoulder", "", "elbow", "", "wrist", "rotation", "gripper",
+    ];
+    let (mut servos, mut reversed) = (String::new(), String::new());
+    for (index, name) in names
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| !name.is_empty())
+    {
+        let id = |index: usize| build.ids.get(index).copied().flatten();
+        let first = id(index).expect("every joint has a first servo");
+        let second = id(index + 1).filter(|_| ["shoulder", "elbow"].contains(name));
+        servos += &match second {
+            Some(second) => format!("{name} = [{first}, {second}]\n"),
+            None => format!("{name} = {first}\n"),
+        };
+        reversed += &format!("{name} = {}\n", build.reversed[index]);
+    }
+    format!("[arm.servos]\n{servos}[arm.reversed]\n{reversed}")
+}
+
+/// A person at the page, who takes the robot into his hands.
+struct Person {
+    page: Page,
+    truth: Subscriber<TruthPose>,
+    hands: Client<WorldRequest>,
+    seen: Truth,
+    /// Which way the wheels turned last: 'f', 'b' or '0'.
+    ways: [char; 2],
+    /// The number of what was answered last.
+    answered: String,
+}
+
+impl Person {
+    /// Opens the view from the start of the page.
+    fn new(scene: &Scene) -> Self {
+        let mut page = scene.page();
+        open(&mut page);
+        Self {
+            page,
+            truth: scene.bus.subscriber().expect("a topic"),
+            hands: scene.bus.client().expect("a request"),
+            seen: Truth::default(),
+            ways: ['0'; 2],
+            answered: String::new(),
+        }
+    }
+
+    /// Takes the wheel, begins, and makes the robot manual.
+    fn begin(&mut self) {
+        does(&mut self.page, "begin");
+        self.page
+            .wait_until("document.querySelector('#commission').dataset.question === 'ask_boards'");
+        self.page.wait_until(
+            "document.querySelector('#mode').textContent !== 'AUTONOMOUS' || \
+             document.querySelector('#commission [data-does=manual]') !== null",
+        );
+        self.page.click_until(
+            "#commission [data-does=manual]",
+            "document.querySelector('#mode').textContent.includes('BY HAND')",
+        );
+    }
+
+    /// Looks at the robot.
+    fn look(&mut self) {
+        while let Some(truth) = self.truth.receive().expect("readable") {
+            self.seen = *truth;
+            let speeds = [truth.left_mm_per_s, truth.right_mm_per_s];
+            for (way, speed) in self.ways.iter_mut().zip(speeds) {
+                match speed {
+                    20.0.. => *way = 'f',
+                    ..-20.0 => *way = 'b',
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// What is asked, once something else is asked than was answered last and can be answered.
+    fn question(&mut self) -> Option<String> {
+        let now = self.page.value(
+            "(() => { const view = document.querySelector('#commission'); \
+             const is = view.querySelector('.answers :is(button, input):not(:disabled)') !== null; \
+             return is ? [view.dataset.asked, view.dataset.question] : ['', '']; })()",
+        );
+        let [asked, question] =
+            [0, 1].map(|part| now[part].as_str().unwrap_or_default().to_owned());
+        (!question.is_empty() && asked != self.answered).then_some(question)
+    }
+
+    fn asked(&mut self) -> String {
+        wait_for("a question", || {
+            self.look();
+            self.question()
+        })
+    }
+
+    /// Notes what is answered now.
+    fn answering(&mut self) {
+        let asked = self
+            .page
+            .value("document.querySelector('#commission').dataset.asked");
+        self.answered = asked.as_str().unwrap_or_default().to_owned();
+    }
+
+    fn yes(&mut self) {
+        self.answering();
+        self.page.click("#commission .answers [data-does=yes]");
+    }
+
+    fn number(&mut self, number: &str) {
+        self.answering();
+        self.page.fill("#commission .answers input", number);
+        self.page.click("#commission .answers [data-does=set]");
+    }
+
+    /// Takes the time that a sensor needs to see what has been done.
+    fn pause(&self) {
+        std::thread::sleep(Duration::from_millis(800));
+    }
+
+    /// Does something with the hands.
+    fn act(&mut self, kind: WorldAskKind, x: u8, y: u8) {
+        let ask = WorldAsk {
+            kind: kind.into(),
+            x,
+            y,
+            heading: Heading::Right.into(),
+            ..WorldAsk::default()
+        };
+        let answer = wait_for("the world", || self.hands.call(ask, WATCHDOG / 100).ok());
+        assert_eq!(answer.outcome, Outcome::Done, "{kind:?}: {answer:?}");
+    }
+
+    /// Puts it down so far to the left of where it stands, in mm.
+    fn shift(&mut self, left: i16) {
+        let x = u8::try_from(left + 128).expect("a small step");
+        self.act(WorldAskKind::Shift, x, 0);
+    }
+
+    fn place(&mut self, x: u8, y: u8) {
+        self.act(WorldAskKind::Place, x, y);
+    }
+
+    /// Moves the line sensors over tape and floor until something else is asked.
+    fn sway(&mut self) {
+        for step in (0..).map(|step: i16| step % 24) {
+            if step == 0 {
+                self.place(0, 0);
+                self.shift(-SWAY);
+            }
+            self.shift(if step < 12 { 10 } else { -10 });
+            if self.question().is_some() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(60));
+        }
+    }
+
+    /// Answers at the moment when the robot is there, unless it stands and is to begin anew.
+    fn watch(&mut self, question: &str, is_there: impl Fn(&Truth) -> bool) {
+        let goes_on = wait_for("the end of a movement", || {
+            self.look();
+            let asked = self
+                .page
+                .value("document.querySelector('#commission').dataset.question");
+            match asked == question {
+                true => is_there(&self.seen).then_some(true),
+                false => Some(false),
+            }
+        });
+        if goes_on {
+            self.answering();
+            self.page
+                .value("document.querySelector('#commission [data-does=now]')?.click()");
+        }
+    }
+
+    /// Answers what is asked, from what is seen. Returns whether it was the last question.
+    fn answer(&mut self, question: &str) -> bool {
+        self.look();
+        let begun = self.seen;
+        match question {
+            "ask_boards" | "ask_finish" => self.yes(),
+            "ask_line_sway" => {
+                self.yes();
+                self.sway();
+            }
+            "ask_line_floor" | "ask_line_tape" => {
+                self.place(0, 0);
+                if question == "ask_line_floor" {
+                    self.shift(100);
+                }
+                self.pause();
+                self.yes();
+            }
+            "ask_range_far" | "ask_range_near" => {
+                let cm = if question == "ask_range_far" { 30 } else { 20 };
+                self.act(WorldAskKind::Hold, cm, 0);
+                self.pause();
+                self.number(&cm.to_string());
+            }
+            "ask_wheels_ahead" | "ask_wheels_left" => {
+                self.act(WorldAskKind::Lift, 0, 0);
+                self.pause();
+                self.look();
+                self.ways = ['0'; 2];
+                self.yes();
+            }
+            "ask_saw_ahead" | "ask_saw_left" => {
+                self.answering();
+                for (side, way) in ["left", "right"].into_iter().zip(self.ways) {
+                    let choice = format!("#commission input[name={side}][value='{way}']");
+                    self.page.click(&choice);
+                }
+                self.page.click("#commission .answers [data-does=set]");
+            }
+            "ask_battery" => {
+                self.answering();
+                self.page.click("#commission .answers [data-does=no]");
+            }
+            "ask_turn" => {
+                self.place(1, 1);
+                self.pause();
+                self.yes();
+            }
+            "ask_turn_round" => {
+                self.watch(question, |truth| {
+                    truth.heading_rad - begun.heading_rad >= TAU
+                });
+            }
+            "ask_speed" => {
+                self.place(0, 0);
+                self.pause();
+                self.number(&format!("{:.0}", DRIVE / 10.0));
+            }
+            "ask_speed_there" => {
+                self.watch(question, |truth| truth.x_mm - begun.x_mm >= DRIVE);
+            }
+            // What this person knows nothing of stays as it is described.
+            _ => {
+                self.answering();
+                does(&mut self.page, "skip");
+            }
+        }
+        question == "ask_finish"
+    }
+
+    /// Goes on until this is asked.
+    fn until(&mut self, wanted: &str) {
+        loop {
+            let question = self.asked();
+            if question == wanted {
+                return;
+            }
+            match question.as_str() {
+                "ask_boards" => self.yes(),
+                _ => {
+                    self.answering();
+                    does(&mut self.page, "skip");
+                }
+            }
+        }
+    }
+}
+
+/// Opens the view as somebody who looks for it.
+fn open(page: &mut Page) {
+    page.click("#tab-setup");
+    page.click_until(
+        "#commission-open",
+        "document.querySelector('#commission [data-does]') !== null",
+    );
+}
+
+fn does(page: &mut Page, what: &str) {
+    page.click(&format!("#commission [data-does={what}]:not(:disabled)"));
+}
+
+/// A sentence of the robot's table in Swedish.
+fn swedish(name: &str) -> &'static str {
+    let mut all = sentences().filter(|sentence| sentence.name == name);
+    all.next().expect("it is there").swedish
+}
+
+#[test]
+fn a_robot_that_nobody_described_is_set_up_by_clicks_and_delivers() {
+    let (mut scene, config) = unknown();
+    let mut person = Person::new(&scene);
+    person.begin();
+    let (mut was_reloaded, mut was_stopped) = (false, false);
+    loop {
+        let question = person.asked();
+        match question.as_str() {
+            // The page goes away in the middle, and the person comes back and goes on.
+            "ask_range_far" if !was_reloaded => {
+                was_reloaded = true;
+                let text = person.page.text("#commission .question");
+                assert!(text.starts_with("Distance sensor: hold"), "{text}");
+                person.page.change_language();
+                person
+                    .page
+                    .wait_for("#commission .question", swedish("ask_range_far"));
+                person
+                    .page
+                    .wait_for("#commission [data-does=skip]", swedish("page_skip"));
+                person.page.change_language();
+                person.page.wait_for(
+                    "#commission .found, #commission .steps",
+                    "read low over dark tape",
+                );
+                person.page.call("Page.reload", &json!({}));
+                person.page.wait_for("#link", " ms");
+                open(&mut person.page);
+                // Nobody answers who has not the wheel.
+                person
+                    .page
+                    .wait_until("document.querySelector('#commission [data-does=take]') !== null");
+                does(&mut person.page, "take");
+                person.answered.clear();
+            }
+            // A stop ends the movement and its step, and nothing goes on by itself.
+            "ask_turn_round" if !was_stopped => {
+                was_stopped = true;
+                scene.wait_to_move();
+                press(&mut person.page, "Escape");
+                person.page.wait_for("#stop-said", "both wheels stand");
+                scene.assert_stands();
+                person.page.wait_for(
+                    "#commission .why",
+                    "The step begins anew, and the robot stands",
+                );
+                assert_eq!(person.asked(), "ask_turn");
+                person.yes();
+                person.page.wait_for("#commission .why", "stop");
+                scene.assert_stands();
+                scene.resume();
+                person
+                    .page
+                    .wait_until("!document.body.classList.contains('stopped')");
+            }
+            question => {
+                if person.answer(question) {
+                    break;
+                }
+            }
+        }
+    }
+    assert!(was_reloaded && was_stopped);
+    let page = &mut person.page;
+    page.wait_for("#commission .question", "robot.toml has it");
+    page.wait_for("#commission .steps", "A full turn takes");
+    page.wait_for("#commission .steps", "Nothing measures the battery");
+    // The file can be carried to another machine.
+    page.save_into(scene.domain.folder());
+    does(page, "save");
+    let kept = scene.domain.folder().join("robot (1).toml");
+    let saved = wait_for("the file", || {
+        let text = fs::read_to_string(&kept).ok()?;
+        text.ends_with('\n').then_some(text)
+    });
+    let written = fs::read_to_string(scene.domain.folder().join("robot.toml"));
+    assert_eq!(saved.trim_end(), written.expect("the file").trim_end());
+    for line in [
+        "swapped = true",
+        "left_reversed = true",
+        "right_reversed = false",
+        "dark_is_high = false",
+        "model = \"gp2y0a02\"",
+        "divider = false",
+    ] {
+        assert!(saved.contains(line), "{line}\n{saved}");
+    }
+    drop(person);
+    let Scene {
+        truth,
+        bus,
+        mut up,
+        browser,
+        domain,
+        ..
+    } = scene;
+    drop((truth, bus, browser));
+    up.signal(Signal::INT);
+    // Whether it had a mission that failed is of no interest.
+    up.wait().expect("it ends");
+    let mut robot = domain.start(&[
+        "up",
+        "--config",
+        &config,
+        "--headless",
+        "--mission",
+        "1",
+        "--exit-when-done",
+        "--json",
+    ]);
+    assert_eq!(robot.wait(), Some(0), "{}\n{saved}", robot.log());
+    assert_eq!(robot.json()["delivered"], json!([1]));
+    domain.assert_clean();
+}
+
+#[test]
+fn whoever_dies_in_the_middle_the_robot_stands_and_its_boards_are_as_they_were() {
+    let (scene, config) = unknown();
+    let mut health = scene.bus.subscriber::<LinkHealth>().expect("a topic");
+    let mut described = |what: &str, is_it: &dyn Fn(u32) -> bool| {
+        wait_for(what, || {
+            let described = health.latest().expect("readable")?.description;
+            (described != 0 && is_it(described)).then_some(described)
+        })
+    };
+    let before = described("the boards", &|_| true);
+    let mut person = Person::new(&scene);
+    // The process that commissions is killed, and then comm, whose child it is.
+    for whose in ["commissioning", "comm"] {
+        person.begin();
+        person.answered.clear();
+        person.until("ask_range_far");
+        described("a trial", &|now| now != before);
+        let comm = scene.up.service("comm").expect("it runs");
+        let works = wait_for("its process", || children(comm).first().copied());
+        // Another one is refused meanwhile.
+        let second = scene.domain.run(&["commission", "--config", &config]);
+        let said = String::from_utf8_lossy(&second.stderr).into_owned();
+        assert!(
+            !second.status.success() && said.contains(&format!("process {works}")),
+            "{said}"
+        );
+        let killed = if whose == "comm" { comm } else { works };
+        kill_process(pid(killed), Signal::KILL).expect("it runs");
+        described("what was before", &|now| now == before);
+        person
+            .page
+            .wait_until("document.querySelector('#commission [data-does=begin]') !== null");
+    }
+    // The page is closed: the robot is given back.
+    person.begin();
+    person.answered.clear();
+    person.until("ask_range_far");
+    described("a trial", &|now| now != before);
+    let Person {
+        page, truth, hands, ..
+    } = person;
+    page.close();
+    described("what was before", &|now| now == before);
+    let kept = fs::read_to_string(scene.domain.folder().join("robot.toml"));
+    assert_eq!(
+        kept.expect("the file"),
+        arm(&other().1.arm),
+        "nothing is written"
+    );
+    drop((truth, hands, health));
+    scene.end();
+}
+
+/// What a robot tells that is in the middle of it.
+pub(crate) const AT_WORK: [&str; 3] = [
+    "state time_ms=64000 hold=undescribed remedy=describe mode=manual pick=auto stopped=0 \
+     phase=waiting_for_order line_bits=00001110000 sensor_up=1 steering_up=1 left_duty=0 right_duty=0",
+    "commission asked=5 step=line place=2 steps=8 question=ask_line_tape takes=yes moves=0 \
+     shows=live_line%20----###---- why=ended%20line_mixed%201,%202",
+    "found 1 boards found_polarity_low",
+];
+
+#[test]
+fn the_reason_why_it_stands_leads_there_and_keys_alone_answer() {
+    let stage = Stage::new(None);
+    let robot = stage.robot("r1", &AT_WORK);
+    let mut page = stage.page(&stage.url);
+    page.wait_for("#state", "obody has said how this robot is built");
+    assert_eq!(page.text("#remedy"), "Set up a robot");
+    page.click("#remedy");
+    page.wait_for("#commission h2", "Line sensors");
+    page.wait_for("#commission .why", "counted from the left: 1, 2");
+    page.wait_until("document.querySelectorAll('#commission .on').length === 3");
+    assert_eq!(
+        page.text("#commission .steps [aria-current] strong"),
+        "Line sensors"
+    );
+    page.click("#commission [data-does=take]");
+    page.wait_until(
+        "document.querySelector('#commission .answers [data-does=yes]:not(:disabled)') !== null",
+    );
+    page.listen_in();
+    // It is answered by Enter, once however long that is held, and Space stops the robot.
+    page.value("document.querySelector('#commission [data-does=yes]').focus()");
+    crate::keyboard::hold_down(&mut page, "Enter");
+    let answers = "sent.filter((line) => line.includes('answer 5 yes')).length";
+    page.wait_until(&format!("{answers} === 1"));
+    page.pause();
+    assert_eq!(page.value(answers), 1);
+    // Whoever is there says so, and a hidden view does not.
+    page.wait_until("sent.some((line) => line.endsWith('commission here'))");
+    page.click("#tab-missions");
+    page.value("sent.length = 0");
+    page.pause();
+    page.pause();
+    assert_eq!(
+        page.value("sent.some((line) => line.includes('commission'))"),
+        false
+    );
+    // A number and the ways of the wheels are chosen, and a movement has its own button to stand.
+    open(&mut page);
+    let asks = |how: &str| {
+        let how = format!("commission step=wheels place=4 steps=8 {how}");
+        robot.says(&[AT_WORK[0], &how, AT_WORK[2]]);
+    };
+    asks("asked=6 question=ask_saw_ahead takes=ways moves=0");
+    page.wait_for("#commission .question", "which way the right ones?");
+    page.wait_until("document.querySelector('#commission [name=left]:not(:disabled)') !== null");
+    page.click("#commission [name=left][value=f]");
+    page.click("#commission [name=right][value='0']");
+    page.click("#commission [data-does=set]");
+    page.wait_until("sent.some((line) => line.endsWith('commission answer 6 f0'))");
+    asks("asked=7 question=ask_turn_round takes=yes moves=1");
+    page.wait_until("document.querySelector('#commission [data-does=stand]') !== null");
+    page.click("#commission [data-does=stand]");
+    page.wait_until("sent.some((line) => line.endsWith('commission stand'))");
+    // What this page does not know yet is answered in a field.
+    asks("asked=8 question=ask_something_new takes=joint moves=0");
+    page.wait_for("#commission .question", "ask_something_new");
+    page.wait_until("document.querySelector('#commission .answers input:not(:disabled)') !== null");
+    page.fill("#commission .answers input", "3");
+    page.click("#commission [data-does=set]");
+    page.wait_until("sent.some((line) => line.endsWith('commission answer 8 3'))");
+    drop((page, robot));
+    stage.end();
+}
