@@ -131,6 +131,20 @@ impl Person {
         }
     }
 
+    /// Where the servos of the arm are.
+    fn servos(&mut self) -> [u16; 8] {
+        self.look();
+        self.seen.servo_position
+    }
+
+    /// Once what was given before has had its time, the arm stands for half a second.
+    fn assert_arm_stands(&mut self) {
+        self.pause();
+        let before = self.servos();
+        std::thread::sleep(Duration::from_millis(500));
+        assert_eq!(self.servos(), before);
+    }
+
     /// What is asked, once something else is asked than was answered last and can be answered.
     fn question(&mut self) -> Option<String> {
         let now = self.page.value(
@@ -580,4 +594,49 @@ fn the_reason_why_it_stands_leads_there_and_keys_alone_answer() {
     page.wait_until("sent.some((line) => line.endsWith('commission answer 8 3'))");
     drop((page, robot));
     stage.end();
+}
+
+/// The arm is described, and nothing of it is found out here: only its joints are tried.
+#[test]
+fn a_joint_moves_only_while_its_button_is_held_by_mouse_or_key_and_never_after_a_stop() {
+    let (mut scene, _) = unknown();
+    let mut person = Person::new(&scene);
+    person.begin();
+    person.answered.clear();
+    person.until("ask_joint_moves");
+    let about = person.page.text("#commission .question");
+    assert!(about.starts_with("Base, to the "), "{about}");
+    let button = "#commission .answers [data-does=hold]:not(:disabled)";
+    let at = person.page.middle(button);
+    for way in ["mouse", "key"] {
+        let before = person.servos();
+        match way {
+            "mouse" => person.page.mouse("mousePressed", at),
+            _ => {
+                let focus = format!("document.querySelector('{button}').focus()");
+                person.page.value(&focus);
+                person.page.key_down("Enter");
+            }
+        }
+        wait_for("the joint to move", || (person.servos() != before).then_some(()));
+        match way {
+            "mouse" => person.page.mouse("mouseReleased", at),
+            _ => person.page.key_up("Enter"),
+        }
+        person.assert_arm_stands();
+    }
+    // Somebody stops the robot while the button is down.
+    let before = person.servos();
+    person.page.mouse("mousePressed", at);
+    wait_for("the joint to move", || (person.servos() != before).then_some(()));
+    press(&mut person.page, "Escape");
+    person.page.wait_for("#stop-said", "both wheels stand");
+    person.assert_arm_stands();
+    person.page.mouse("mouseReleased", at);
+    person.assert_arm_stands();
+    scene.resume();
+    scene.assert_stands();
+    person.assert_arm_stands();
+    drop(person);
+    scene.end();
 }
