@@ -106,14 +106,12 @@ impl Person {
         does(&mut self.page, "begin");
         self.page
             .wait_until("document.querySelector('#commission').dataset.question === 'ask_boards'");
-        self.page.wait_until(
-            "document.querySelector('#mode').textContent !== 'AUTONOMOUS' || \
-             document.querySelector('#commission [data-does=manual]') !== null",
-        );
-        self.page.click_until(
-            "#commission [data-does=manual]",
-            "document.querySelector('#mode').textContent.includes('BY HAND')",
-        );
+        wait_for("the mode to be the hand's", || {
+            self.page
+                .value("document.querySelector('#commission [data-does=manual]')?.click()");
+            self.page.pause();
+            self.page.text("#mode").contains("BY HAND").then_some(())
+        });
     }
 
     /// Looks at the robot.
@@ -338,7 +336,7 @@ fn open(page: &mut Page) {
     page.click("#tab-setup");
     page.click_until(
         "#commission-open",
-        "document.querySelector('#commission [data-does]') !== null",
+        "document.querySelector('#commission:not([hidden]) [data-does]') !== null",
     );
 }
 
@@ -421,9 +419,11 @@ fn a_robot_that_nobody_described_is_set_up_by_clicks_and_delivers() {
     page.wait_for("#commission .steps", "A full turn takes");
     page.wait_for("#commission .steps", "Nothing measures the battery");
     // The file can be carried to another machine.
-    page.save_into(scene.domain.folder());
+    let folder = scene.domain.folder().join("carried");
+    fs::create_dir(&folder).expect("a folder");
+    page.save_into(&folder);
     does(page, "save");
-    let kept = scene.domain.folder().join("robot (1).toml");
+    let kept = folder.join("robot.toml");
     let saved = wait_for("the file", || {
         let text = fs::read_to_string(&kept).ok()?;
         text.ends_with('\n').then_some(text)

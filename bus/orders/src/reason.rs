@@ -142,10 +142,6 @@ codes! {
     OverHeldUp = "over_held_up",
     OverUnheard = "over_unheard",
     Endless = "endless",
-    CommissionNone = "commission_none",
-    CommissionBusy = "commission_busy",
-    CommissionOther = "commission_other",
-    CommissionBroken = "commission_broken",
 }
 
 /// A code with its values, as it is written in a line.

@@ -350,8 +350,7 @@ impl Shell {
                     if let Some(process) = self.commissions.take() {
                         process.reap();
                     }
-                    self.conversation
-                        .commission_over(Code::CommissionBroken.into());
+                    self.conversation.commission_over(None);
                 }
             }
         }
@@ -376,7 +375,7 @@ impl Shell {
             Ok(process) => self.commissions = Some(process),
             Err(error) => self
                 .conversation
-                .commission_over(Reason::new(Code::Misread, &[&error])),
+                .commission_over(Some(Reason::new(Code::Misread, &[&error]))),
         }
     }
 

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { field, steps, told, values } from "../page/commission/said.js";
+import { field, found, saved, steps, told, values } from "../page/commission/said.js";
 import { report } from "../page/station/report.js";
 import { Robot } from "../page/station/robot.js";
 import { speak } from "../page/words/words.js";
@@ -35,10 +35,11 @@ test("the lines of a commissioning replace what was told before", () => {
   tells("kept 1 2 [wheels]");
   tells("kept 2 2   swapped = true  # as it is");
   assert.equal(robot.commission.question, "ask_line_floor");
-  assert.deepEqual(robot.found[0], ["line", "found_polarity_low"]);
-  assert.deepEqual(robot.kept, ["[wheels]", "  swapped = true  # as it is"]);
+  assert.deepEqual(found(robot.found, "line"), ["the line sensors read low over dark tape"]);
+  assert.deepEqual(found(robot.found, "turn"), []);
+  assert.equal(saved(robot.kept), "[wheels]\n  swapped = true  # as it is\n");
   tells("kept 1 1 [line]");
   tells("commission");
   tells("found 0");
-  assert.deepEqual([robot.kept, robot.commission, robot.found], [["[line]"], {}, []]);
+  assert.deepEqual([saved(robot.kept), robot.commission, found(robot.found, "line")], ["[line]\n", {}, []]);
 });

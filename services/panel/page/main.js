@@ -202,14 +202,14 @@ at("commission-open").onclick = () => show(at("commission-open"));
 function show(tab) {
   const wasSetUp = isSetUp();
   document.body.dataset.view = tab.getAttribute("aria-controls") ?? "";
-  const isOpener = tab === at("commission-open");
+  const seat = tab === at("commission-open") ? at("tab-setup") : tab;
   for (const other of every("[role=tab]", HTMLButtonElement)) {
-    const chosen = other === (isOpener ? at("tab-setup") : tab);
+    const chosen = other === seat;
     other.setAttribute("aria-selected", String(chosen));
     other.tabIndex = chosen ? 0 : -1;
     document.getElementById(other.getAttribute("aria-controls") ?? "")?.toggleAttribute("hidden", other !== tab);
   }
-  at("commission").toggleAttribute("hidden", !isOpener);
+  at("commission").toggleAttribute("hidden", seat === tab);
   driving.letGo();
   // Who drives or sets up sees what is now.
   if (tab.id === "tab-drive" || isSetUp()) moment.back();

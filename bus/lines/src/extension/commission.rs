@@ -21,8 +21,7 @@ use core::fmt;
 
 use lager_orders::{AnswerWord, Commission, Reason};
 
-use super::fields::{Value, fields};
-use super::order::number;
+use super::fields::{Value, fields, number};
 use crate::misread::Misread;
 use crate::reader::Reader;
 use crate::text::{Name, Text};

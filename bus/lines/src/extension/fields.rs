@@ -9,6 +9,8 @@ use lager_orders::{Mode, Pick, Reason};
 use lager_wire::{Binary, LineBits};
 
 use crate::floor::product;
+use crate::misread::Misread;
+use crate::reader::Reader;
 use crate::text::Name;
 
 /// Defines a struct, how each field is read and in which order they are written.
@@ -129,6 +131,12 @@ impl Loads {
     pub const fn get(self) -> [i16; 8] {
         self.0
     }
+}
+
+/// The number that stands next.
+pub(super) fn number(reader: &mut Reader<'_>) -> Result<u32, Misread> {
+    let wanted = "a number from 0 to 4294967295";
+    reader.word().number(wanted, 0, i64::from(u32::MAX))
 }
 
 /// How a field's value is written behind the `=`.

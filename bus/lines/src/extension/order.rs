@@ -40,7 +40,7 @@ use lager_wire::{Callsign, OperatorCommand, Speed};
 use thiserror::Error;
 
 use super::commission;
-use super::fields::Value as _;
+use super::fields::{Value as _, number};
 use crate::command::{Code, CommandError, read_arm, read_wheels};
 use crate::floor::{Spelled as _, Words};
 use crate::misread::Misread;
@@ -163,11 +163,6 @@ fn read_given(mut reader: Reader<'_>) -> Result<(u32, Action), Fault> {
         _ => 0,
     };
     Ok((late_ms, read_action(reader)?))
-}
-
-pub(super) fn number(reader: &mut Reader<'_>) -> Result<u32, Misread> {
-    let wanted = "a number from 0 to 4294967295";
-    reader.word().number(wanted, 0, i64::from(u32::MAX))
 }
 
 fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {

@@ -7,10 +7,9 @@ use lager_orders::{EventKind, Reason};
 use lager_wire::LineReading;
 
 use super::commission::{Commissioning, FoundOut, KeptLine};
-use super::fields::Degrees;
+use super::fields::{Degrees, number};
 use super::health::Health;
 use super::listed::{Block, Listed, Queued};
-use super::order::number;
 use super::state::State;
 use super::thinks::Thinks;
 use crate::floor::{Spelled as _, Words};

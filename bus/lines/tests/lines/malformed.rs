@@ -96,7 +96,8 @@ const REQUEST: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, a
 const ANSWER: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, styrcomm \
                       and pickup_done";
 const ACTION: &str = "one of order, cancel, first, up, clear, back, mode, resume, reset, place, \
-                      picked, pick, drive, arm, gains, calibrate, restart, horn and obstacle";
+                      picked, pick, drive, arm, gains, calibrate, restart, horn, obstacle and \
+                      commission";
 const EVENT: &str = "one of in_position, getting_item, item_delivered, next_node, refused, \
                      pickup_refused, failed, way_blocked, stopped, resumed, mode, asked, ended, restarted, \
                      link_lost and link_back";

@@ -23,7 +23,7 @@ impl Conversation {
         let known = &mut self.known.commission;
         match said {
             Commission::Begin | Commission::Undo if known.is_at_work => {
-                return Err(Code::CommissionBusy.into());
+                return Err(Code::TooMuchAsked.into());
             }
             Commission::Begin | Commission::Undo => {
                 *known = Commissioned {
@@ -31,9 +31,9 @@ impl Conversation {
                     ..Commissioned::default()
                 };
             }
-            _ if !known.is_at_work => return Err(Code::CommissionNone.into()),
+            _ if !known.is_at_work => return Err(not_running()),
             Commission::Answer { asked, .. } if known.how.asked != Some(asked) => {
-                return Err(Code::CommissionOther.into());
+                return Err(Code::AskedAnew.into());
             }
             _ => {}
         }
@@ -53,12 +53,12 @@ impl Conversation {
         }
     }
 
-    /// The process that commissions has ended, or could not be started. `why` is said if it has not
-    /// said itself how it ended.
-    pub fn commission_over(&mut self, why: Reason) {
+    /// The process that commissions has ended, or could not be started because of `why`. What it has
+    /// said itself of its end counts.
+    pub fn commission_over(&mut self, why: Option<Reason>) {
         let known = &mut self.known.commission;
         known.is_at_work = false;
-        let ended = known.how.ended.take().unwrap_or(why);
+        let ended = known.how.ended.take().or(why).unwrap_or_else(not_running);
         *known.how = lager_lines::extension::Commissioning {
             ended: Some(ended),
             ..Default::default()
@@ -79,4 +79,9 @@ impl Conversation {
     pub(super) fn moves_commissioned(&self) -> bool {
         self.known.commission.how.moves == Some(true)
     }
+}
+
+/// Nobody commissions the robot.
+fn not_running() -> Reason {
+    Reason::new(Code::NotRunning, &[&"commission"])
 }

@@ -43,7 +43,7 @@ impl<K: Copy> Orders<K> {
                 return Ok(Begun::Steers(wheels.into(), Some(lease)));
             }
             // It is for a process of its own.
-            Action::Commission(_) => return Err(Code::CommissionNone.into()),
+            Action::Commission(_) => return Err(Reason::new(Code::NotRunning, &[&"commission"])),
             Action::Arm(step) => return Ok(Begun::Steers(OperatorCommand::Arm(step), None)),
             Action::Add { order: 0, .. } => return Err(Code::OrderZero.into()),
             Action::Add { order, .. } if queue.has(order) => {

@@ -8,7 +8,7 @@
 import { Answers } from "./answers.js";
 import { Live } from "./live.js";
 import { button, element } from "./make.js";
-import { field, sentence, steps, word } from "./said.js";
+import { field, found, saved, sentence, steps, word } from "./said.js";
 import { make, set } from "../parts/svg.js";
 import { reason } from "../words/sentences.js";
 import { current, put } from "../words/words.js";
@@ -42,10 +42,12 @@ export class Commission {
     Object.assign(look, { rel: "stylesheet", href: new URL("commission/commission.css", document.baseURI).href });
     document.head.append(look);
 
+    view.setAttribute("aria-labelledby", "commission-title");
     this.list = element(element(view, "nav"), "ol", "steps");
     const main = element(view, "div", "work");
     const head = element(main, "header");
     this.title = element(head, "h2");
+    this.title.id = "commission-title";
     this.place = element(head, "p", "quiet");
     this.question = element(main, "p", "question");
     this.question.setAttribute("role", "status");
@@ -54,7 +56,7 @@ export class Commission {
     this.live = new Live(element(main, "div", "drawing"));
     this.shows = element(main, "p", "shows");
     const foot = element(main, "footer");
-    this.answers = new Answers(element(foot, "div", "answers"), (answer) => this.answer(answer), () => this.say("stand"), () => this.hold());
+    this.answers = new Answers(element(foot, "div", "answers"), (answer) => this.answer(answer), () => this.send("stand"), () => this.hold());
     this.said = element(foot, "p", "said");
     this.said.setAttribute("role", "alert");
     this.ways = element(foot, "p", "row");
@@ -90,7 +92,7 @@ export class Commission {
    * @param {string} words
    * @returns {Promise<boolean>} whether it is taken
    */
-  async say(words) {
+  async send(words) {
     const { robot, link } = this;
     if (!robot) return false;
     const at = robot.commission?.asked ?? "";
@@ -105,7 +107,7 @@ export class Commission {
     if (asked === undefined) return;
     this.answers.taken();
     this.answeredAt = performance.now();
-    if (!(await this.say(`answer ${asked} ${answer}`))) this.answers.refused();
+    if (!(await this.send(`answer ${asked} ${answer}`))) this.answers.refused();
   }
 
   /** A button is held: what it moves goes on for a moment. */
@@ -123,7 +125,7 @@ export class Commission {
    * @param {"begin" | "undo"} what
    */
   async begin(what) {
-    if (await this.take()) await this.say(what);
+    if (await this.take()) await this.send(what);
   }
 
   async take() {
@@ -144,7 +146,7 @@ export class Commission {
 
   /** Saves the description that was found out, for another machine. */
   save() {
-    const blob = new Blob([(this.robot?.kept ?? []).map((line) => `${line}\n`).join("")], { type: "application/toml" });
+    const blob = new Blob([saved(this.robot?.kept ?? [])], { type: "application/toml" });
     const anchor = document.createElement("a");
     anchor.href = URL.createObjectURL(blob);
     anchor.download = "robot.toml";
@@ -188,7 +190,7 @@ export class Commission {
   /** @param {import("../station/robot.js").Fields} how */
   drawSteps(how) {
     const names = steps();
-    const found = this.robot?.found ?? [];
+    const results = this.robot?.found ?? [];
     if (this.list.childElementCount !== names.length || this.language !== current()) {
       this.language = current();
       this.list.replaceChildren();
@@ -207,12 +209,12 @@ export class Commission {
     names.forEach((name, at) => {
       const item = this.list.children[at];
       if (!item) return;
-      const results = found.filter(([step]) => step === name).map(([, said]) => field(said) ?? "");
-      const isDone = now > at || results.length > 0 || Boolean(how.ended?.startsWith("ended_kept"));
+      const own = found(results, name);
+      const isDone = now > at || own.length > 0 || Boolean(how.ended?.startsWith("ended_kept"));
       item.classList.toggle("done", isDone && at !== now);
       item.ariaCurrent = at === now ? "step" : null;
       put(item.children[2] ?? item, isDone && at !== now ? word("done") : "");
-      put(item.children[3] ?? item, sentences(results.join(". ")));
+      put(item.children[3] ?? item, sentences(own.join(". ")));
     });
   }
 
@@ -236,7 +238,7 @@ export class Commission {
     const add = (does, press, className = "") => button(this.ways, does, press, className);
     if (this.isLeaving) {
       element(this.ways, "span", "", word("quit_asked"));
-      add("quit_yes", () => this.say("quit"));
+      add("quit_yes", () => this.send("quit"));
       add("quit_no", () => this.leave(false)).focus();
     } else if (isAtWork && !isMine) {
       add("take", () => this.take(), "first");

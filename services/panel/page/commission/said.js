@@ -71,3 +71,21 @@ export const values = (field) => (field === undefined ? [] : plain(field).split(
 
 /** The steps, in their order, as the table names them. */
 export const steps = () => Object.keys(SENTENCES.en).filter((name) => name.startsWith("step_")).map((name) => name.slice("step_".length));
+
+/**
+ * What each step has found out, from the words of its line: how much, and then each step with a code.
+ *
+ * @param {string[]} words
+ * @param {string} step
+ */
+export const found = ([, ...words], step) => words.flatMap((word, at) => (at % 2 && words[at - 1] === step ? [field(word) ?? ""] : []));
+
+/**
+ * The text of the description that was saved last, from the words of its lines: the number of each, how many, and it.
+ *
+ * @param {string[][]} lines
+ */
+export function saved(lines) {
+  const last = lines.slice(Math.max(lines.findLastIndex(([number]) => number === "1"), 0));
+  return last.map(([, , ...words]) => `${words.join(" ")}\n`).join("");
+}

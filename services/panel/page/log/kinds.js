@@ -120,5 +120,5 @@ function asked([name = "", what = "", first = "", ...more]) {
   };
   // What takes no words is called as its button is.
   if (plain().includes(what)) return `${who}: ${[sentence(`do_${what}`), first].filter(Boolean).join(" ")}`;
-  return say(`did_${what}${["obstacle", "pick", "commission"].includes(what) ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
+  return say(`did_${what}${["obstacle", "pick"].includes(what) ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
 }

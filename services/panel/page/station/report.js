@@ -59,11 +59,11 @@ const NOW = {
   commission(robot, words) {
     robot.commission = fields(words);
   },
-  found(robot, [, ...words]) {
-    robot.found = groups(words, 2).map(([step = "", said = ""]) => [step, said]);
+  found(robot, words) {
+    robot.found = words;
   },
-  kept(robot, [number, , ...words]) {
-    robot.kept = [...(number === "1" ? [] : robot.kept), words.join(" ")];
+  kept(robot, words) {
+    robot.kept.push(words);
   },
   sensors(robot, words) {
     robot.sensors = groups(words, 4).map((sensor) => {

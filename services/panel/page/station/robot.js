@@ -120,15 +120,15 @@ export class Robot {
     /** When it told that, by this page's clock. */
     this.healthAt = -Infinity;
     /**
-     * How far its commissioning is, what that has found out, and the lines of the description that it has saved
+     * How far its commissioning is, what that has found out, and the lines of the descriptions that were saved, in words
      * (bus/lines/src/extension/commission.rs).
      *
      * @type {Fields}
      */
     this.commission = {};
-    /** @type {[string, string][]} */
-    this.found = [];
     /** @type {string[]} */
+    this.found = [];
+    /** @type {string[][]} */
     this.kept = [];
     /** @type {[number, number][]} */
     this.route = [];

@@ -1,7 +1,7 @@
 //! The commissioning of the robot: one at a time, an answer only to what is asked, and nothing late.
 
 use lager_lines::extension::Report;
-use lager_orders::{Code, Mode};
+use lager_orders::Mode;
 
 use super::{extended, pass};
 use crate::robot::Robot;
@@ -28,7 +28,7 @@ fn told(robot: &mut Robot) -> Vec<String> {
     pass(robot, 100);
     let mut shown = core::mem::take(&mut robot.shown);
     shown.retain(|line| {
-        ["commission", "found"]
+        ["commission", "found", "kept"]
             .iter()
             .any(|word| line.starts_with(word))
     });
@@ -39,10 +39,16 @@ fn told(robot: &mut Robot) -> Vec<String> {
 fn an_answer_counts_only_for_what_is_asked() {
     let mut robot = asks("question=ask_turn takes=yes moves=0");
     for (words, answer) in [
-        ("answer 2 yes", "refused 2 something else is asked now"),
-        ("answer 4 yes", "refused 3 something else is asked now"),
-        ("begin", "refused 4 somebody sets the robot up already"),
-        ("undo", "refused 5 somebody sets the robot up already"),
+        ("answer 2 yes", "refused 2 the robot asks for it again"),
+        ("answer 4 yes", "refused 3 the robot asks for it again"),
+        (
+            "begin",
+            "refused 4 there are too many requests at a time; try again",
+        ),
+        (
+            "undo",
+            "refused 5 there are too many requests at a time; try again",
+        ),
     ] {
         let number = answer.split(' ').nth(1).expect("a number");
         let said = robot.hears(&[&format!("do {number} commission {words}")]);
@@ -54,7 +60,7 @@ fn an_answer_counts_only_for_what_is_asked() {
     tells(&mut robot, "commission step=turn");
     assert_eq!(
         robot.hears(&["do 7 commission answer 3 yes"]),
-        ["refused 7 something else is asked now"]
+        ["refused 7 the robot asks for it again"]
     );
 }
 
@@ -63,18 +69,14 @@ fn where_none_is_at_work_nothing_but_a_beginning_is_taken() {
     let mut robot = extended(Mode::Manual);
     for (number, words) in (1..).zip(["here", "stand", "quit", "answer 0 yes"]) {
         let said = robot.hears(&[&format!("do {number} commission {words}")]);
-        assert_eq!(
-            said,
-            [format!("refused {number} nobody sets the robot up now")]
-        );
+        let refused = format!("refused {number} the robot's service commission is not running");
+        assert!(said[0].starts_with(&refused), "{said:?}");
     }
     assert_eq!(
         robot.hears(&["do 9 commission undo"]),
         ["[commission undo]", "done 9"]
     );
-    robot
-        .conversation
-        .commission_over(Code::CommissionBroken.into());
+    robot.conversation.commission_over(None);
     assert_eq!(
         robot.hears(&["do 10 commission begin"]),
         ["[commission begin]", "done 10"]
@@ -151,14 +153,14 @@ fn each_station_is_told_how_far_it_is_and_how_it_ended() {
     tells(&mut robot, "kept 1 2 [wheels]");
     tells(&mut robot, "kept 2 2 swapped = true");
     tells(&mut robot, "commission ended=ended_kept%20robot.toml");
-    robot
-        .conversation
-        .commission_over(Code::CommissionBroken.into());
-    let said = pass(&mut robot, 100);
-    assert_eq!(said, ["kept 1 2 [wheels]", "kept 2 2 swapped = true"]);
+    robot.conversation.commission_over(None);
     assert_eq!(
         told(&mut robot),
-        ["commission ended=ended_kept%20robot.toml"]
+        [
+            "commission ended=ended_kept%20robot.toml",
+            "kept 1 2 [wheels]",
+            "kept 2 2 swapped = true"
+        ]
     );
 }
 
@@ -166,8 +168,9 @@ fn each_station_is_told_how_far_it_is_and_how_it_ended() {
 fn one_that_ends_without_a_word_was_broken_off() {
     let mut robot = asks("question=ask_turn takes=yes moves=0");
     told(&mut robot);
-    robot
-        .conversation
-        .commission_over(Code::CommissionBroken.into());
-    assert_eq!(told(&mut robot), ["commission ended=commission_broken"]);
+    robot.conversation.commission_over(None);
+    assert_eq!(
+        told(&mut robot),
+        ["commission ended=not_running%20commission"]
+    );
 }
