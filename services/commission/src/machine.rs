@@ -130,6 +130,8 @@ pub struct Commissioning {
     told: [Option<RobotProfile>; TOLD.len()],
     /// What the bridge was asked to tell, and has not answered yet.
     under_way: Option<RobotProfile>,
+    /// Whether anything was told at all.
+    has_tried: bool,
     /// The hash of it in `link/health`, once that has come.
     description: Option<u32>,
     /// The person ends it, and the boards are told what they were told before.
@@ -164,6 +166,7 @@ impl Commissioning {
             wanted: built.robot,
             told: [None; TOLD.len()],
             under_way: None,
+            has_tried: false,
             description: None,
             is_leaving: false,
             found: Found::default(),
@@ -424,8 +427,7 @@ impl Commissioning {
         self.built = self.original;
         self.is_leaving = true;
         self.state = State::Over;
-        // Without a first answer nothing was tried.
-        if self.told != [None; TOLD.len()] {
+        if self.has_tried {
             self.tell(now, self.built.robot);
         }
     }
@@ -510,7 +512,7 @@ impl Commissioning {
             (Part::Sensors, Some(told)) => told.sensors != self.wanted.sensors,
         };
         if let Some(part) = TOLD.into_iter().find(is_open) {
-            self.under_way = Some(self.wanted);
+            (self.under_way, self.has_tried) = (Some(self.wanted), true);
             self.effects.push(Effect::Describe(part, self.wanted));
             self.state = State::Tells { since, due: None };
             return;

@@ -113,7 +113,7 @@ fn keep(configured: &Config, mut new: Config, built: &Built) -> Result<ExitCode>
         "the description above is not saved"
     })?;
     console::print(&format!(
-        "{} has it; start the robot again, so that logic uses it, too. `lager commission --undo` puts the former one back",
+        "{} has it; start the robot again, so that logic uses it, too. Then put it on the delivery crossing and drive a mission with it: `lager mode autonomous`, `lager resume`, `lager fetch PRODUCT`. `lager commission --undo` puts the former one back",
         path.display()
     ))?;
     Ok(ExitCode::SUCCESS)
