@@ -132,6 +132,8 @@ pub struct Commissioning {
     told: [Option<RobotProfile>; TOLD.len()],
     /// What the bridge was asked to tell, and has not answered yet.
     under_way: Option<RobotProfile>,
+    /// Whether anything was told at all.
+    has_tried: bool,
     /// The hash of it in `link/health`, once that has come.
     description: Option<u32>,
     /// The person ends it, and the boards are told what they were told before.
@@ -167,6 +169,7 @@ impl Commissioning {
             is_tried: false,
             told: [None; TOLD.len()],
             under_way: None,
+            has_tried: false,
             description: None,
             is_leaving: false,
             found: Found::default(),
@@ -427,7 +430,11 @@ impl Commissioning {
         self.built = self.original;
         self.is_leaving = true;
         self.state = State::Over;
+<<<<<<< HEAD
         if self.is_tried {
+=======
+        if self.has_tried {
+>>>>>>> 0788cd7b17b7d0e393de2af30e5b76a900d4490c
             self.tell(now, self.built.robot);
         }
     }
@@ -524,8 +531,12 @@ impl Commissioning {
             (Part::Sensors, Some(told)) => told.sensors != self.wanted.sensors,
         };
         if let Some(part) = TOLD.into_iter().find(is_open) {
+<<<<<<< HEAD
             self.under_way = Some(self.wanted);
             self.is_tried = true;
+=======
+            (self.under_way, self.has_tried) = (Some(self.wanted), true);
+>>>>>>> 0788cd7b17b7d0e393de2af30e5b76a900d4490c
             self.effects.push(Effect::Describe(part, self.wanted));
             self.state = State::Tells { since, due: None };
             return;

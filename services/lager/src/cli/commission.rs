@@ -10,16 +10,18 @@ use clap::Args;
   lager commission --undo        the description of before the last commissioning
 
 It asks for what only a person at the robot can see, and shows what the sensors read meanwhile. Have a
-meter, something wide and light, a ruler, and room for the robot to turn. Each answer is a line:
+meter, something wide and light, a ruler, a piece of your goods, and room for the robot to turn. Each
+answer is a line:
 
   yes, no, a number, or two letters for the wheels, as the question says
+  Enter    while you hold it, the joint moves that the question names; let go, and it stands
   again    this step from its beginning, with what held before it
   back     the step before, with what held before that
   skip     the next step; what is configured stays
   quit     ends it; the boards are told what they were told before
 
 The robot moves only after an answer to the question that announces this very movement, and stands at
-the next line that you type. A line that was typed before its question counts for nothing. Nothing is
+the next line that you type. Before the arm loses its strength, you are asked to hold it. A line that was typed before its question counts for nothing. Nothing is
 written before the last question is answered with yes. Then robot.toml has the new description, and
 logic uses it from the robot's next start on. Where LANG is Swedish, so are the questions. In the
 panel, *Set up a robot* asks the same.")]
