@@ -112,6 +112,8 @@ fn the_tools_say_the_same_from_afar_as_on_the_bus() {
     assert!(said(&unknown).contains("it sends"), "{}", said(&unknown));
     let other = domain.run(&["--name", "r2", "topic", "list", "--remote", &endpoint]);
     assert!(said(&other).contains("the robot `r2`"), "{}", said(&other));
+    let info = domain.run(&["topic", "info", "nav/map", "--remote", &endpoint]);
+    assert_eq!(info.status.code(), Some(2), "{}", said(&info));
     let nobody = format!("tcp/{}", free());
     let nobody = domain.run(&["topic", "list", "--remote", &nobody]);
     assert!(

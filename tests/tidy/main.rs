@@ -180,6 +180,39 @@ fn only_ports_and_its_baseline_open_iceoryx2() {
 }
 
 #[test]
+fn what_shows_the_robot_outside_has_nothing_that_writes_to_the_bus() {
+    const WRITES: [&str; 6] = [
+        ".publisher::<",
+        ".publisher()",
+        "any_publisher(",
+        ".client::<",
+        ".client()",
+        "StopWord::set",
+    ];
+    let mut complaints = Vec::new();
+    for file in rust_files(Path::new("services/gateway/src")) {
+        let text = std::fs::read_to_string(&file).expect("a source");
+        let found = WRITES.iter().filter(|word| text.contains(**word));
+        complaints.extend(found.map(|word| format!("{}: {word}", file.display())));
+    }
+    // It sends what it is given, and has no bus at all.
+    for file in rust_files(Path::new("services/remote/src")) {
+        let text = std::fs::read_to_string(&file).expect("a source");
+        if text.contains("Bus::") || text.contains("lager_ports::Bus") {
+            complaints.push(format!("{}: a bus", file.display()));
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+    // The words are those of what does write.
+    let writer = root().join("services/logic/src");
+    let writes = rust_files(&writer).iter().any(|file| {
+        let text = std::fs::read_to_string(file).expect("a source");
+        WRITES.iter().any(|word| text.contains(word))
+    });
+    assert!(writes, "logic publishes, and not by any of these words");
+}
+
+#[test]
 fn crates_are_named_after_their_folders_two_levels_deep() {
     for package in packages(&metadata()) {
         let folder = folder(package);

@@ -115,6 +115,12 @@ fn from_afar(
     args: &TopicArgs,
     patience: &TimeLimit,
 ) -> Result<()> {
+    if let TopicCommand::Info { .. } | TopicCommand::Pub { .. } | TopicCommand::Schema { .. } =
+        args.command
+    {
+        let what = "--remote is for list, echo, hz, bw and delay; use the others on the robot";
+        return Err(exit::Usage(what.to_owned()).into());
+    }
     let proof = config.gateway.zenoh.proof()?;
     let robot = config.name.parse()?;
     let remote = Remote::open(endpoint, &robot, proof.as_ref())?;
@@ -138,8 +144,7 @@ fn from_afar(
         TopicCommand::Bw { watch } => tools.bandwidth(&watch.topic, watch.until.limits()),
         TopicCommand::Delay { watch } => tools.delay(&watch.topic, watch.until.limits()),
         TopicCommand::Info { .. } | TopicCommand::Pub { .. } | TopicCommand::Schema { .. } => {
-            let what = "--remote is for list, echo, hz, bw and delay; use the others on the robot";
-            return Err(exit::Usage(what.to_owned()).into());
+            unreachable!("it was refused")
         }
     };
     let shown = shown.map_err(|error| match error {

@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -188,6 +188,45 @@ pub struct Carrier {
     session: Session,
 }
 
+/// What listeners find of a robot, whatever topics it has.
+struct Found {
+    queries: Vec<Queryable<()>>,
+    beats: Publisher<'static>,
+    alive: LivelinessToken,
+}
+
+impl Found {
+    /// Makes it known. Queries go to `to`.
+    fn declare(
+        session: &Session,
+        keys: &Keys,
+        to: &SyncSender<Query>,
+    ) -> Result<Self, zenoh::Error> {
+        let mut queries = Vec::new();
+        for key in [keys.topics(), keys.layouts()] {
+            let to = to.clone();
+            let queryable = session
+                .declare_queryable(key)
+                // Never waits: Zenoh's thread serves all listeners.
+                .callback(move |query| drop(to.try_send(query)))
+                .wait()?;
+            queries.push(queryable);
+        }
+        let beats = session
+            .declare_publisher(keys.counts())
+            .congestion_control(CongestionControl::Drop)
+            // Behind all samples that it counts.
+            .priority(Priority::Background)
+            .wait()?;
+        let alive = session.liveliness().declare_token(keys.alive()).wait()?;
+        Ok(Self {
+            queries,
+            beats,
+            alive,
+        })
+    }
+}
+
 /// A topic that is sent.
 struct Outlet {
     publisher: Publisher<'static>,
@@ -254,27 +293,12 @@ impl Carrier {
         let keys = Keys::of(robot);
         let shelf = Arc::new(Shelf::default());
         let (to, asked) = sync_channel(QUERIES);
-        let found = (|| {
-            let mut queries = Vec::new();
-            for key in [keys.topics(), keys.layouts()] {
-                let to = to.clone();
-                let queryable = session
-                    .declare_queryable(key)
-                    // Never waits: Zenoh's thread serves all listeners.
-                    .callback(move |query| drop(to.try_send(query)))
-                    .wait()?;
-                queries.push(queryable);
-            }
-            let beats = session
-                .declare_publisher(keys.counts())
-                .congestion_control(CongestionControl::Drop)
-                // Behind all samples that it counts.
-                .priority(Priority::Background)
-                .wait()?;
-            let alive = session.liveliness().declare_token(keys.alive()).wait()?;
-            Ok::<_, zenoh::Error>((queries, beats, alive))
-        })();
-        let (queries, beats, alive) = found.map_err(|error| failed(ZenohError::of(error)))?;
+        let found = Found::declare(&session, &keys, &to);
+        let Found {
+            queries,
+            beats,
+            alive,
+        } = found.map_err(|error| failed(ZenohError::of(error)))?;
         let answers = {
             let shelf = Arc::clone(&shelf);
             let thread = std::thread::Builder::new().name("answers".to_owned());
