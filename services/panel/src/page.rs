@@ -236,14 +236,14 @@ mod tests {
     #[test]
     fn what_a_slow_network_carries_is_small_and_unpacks_to_the_same() {
         let first = carried(&FIRST);
-        assert!(first < 88_000, "{first}");
+        assert!(first < 88_200, "{first}");
         let later = carried(
             &LATER
                 .map(|name| format!("/{name}"))
                 .each_ref()
                 .map(String::as_str),
         );
-        assert!(later < 52_000, "{later}");
+        assert!(later < 58_000, "{later}");
     }
 
     #[test]
