@@ -93,7 +93,7 @@ impl std::error::Error for NoteError {}
 pub fn layout_number(text: &str) -> u64 {
     // Two halves that are mixed well, each by the hash of a topic's name.
     let back: String = text.chars().rev().collect();
-    u64::from(id(text)) << 32 | u64::from(id(&back))
+    (u64::from(id(text)) << 32) | u64::from(id(&back))
 }
 
 impl Note {
@@ -109,7 +109,7 @@ impl Note {
     pub fn to_bytes(&self) -> [u8; Self::SIZE] {
         let mut bytes = [0; Self::SIZE];
         bytes[0] = VERSION;
-        bytes[1] = u8::from(self.is_answer) * ANSWER | u8::from(self.is_limited) * LIMITED;
+        bytes[1] = (u8::from(self.is_answer) * ANSWER) | (u8::from(self.is_limited) * LIMITED);
         let stamp = &self.stamp;
         let long = [
             stamp.sequence,
@@ -118,7 +118,7 @@ impl Note {
             stamp.cause_receive_time_ns,
             stamp.publish_time_ns,
             stamp.epoch,
-            u64::from(stamp.writer) | u64::from(stamp.cause_topic) << 32,
+            u64::from(stamp.writer) | (u64::from(stamp.cause_topic) << 32),
             self.counts.run,
             self.number(),
             self.counts.left_out,
