@@ -327,8 +327,12 @@ impl Person {
                 let (joint, grows) = self.joint.expect("it is named");
                 let before = self.seen.servo_position[joint.servo()];
                 self.press();
+                if self.question().is_some() {
+                    // The step has begun anew: a busy machine was late with an order.
+                    return false;
+                }
                 let after = self.seen.servo_position[joint.servo()];
-                assert_ne!(before, after, "{joint:?}");
+                assert_ne!(before, after, "{joint:?}: {:#?}", self.printed);
                 self.say(if grows == (after > before) {
                     "yes"
                 } else {
@@ -336,14 +340,21 @@ impl Person {
                 });
             }
             Question::ClawEmpty => {
+                self.act(WorldAskKind::Fill, 0, 0, Heading::Right);
                 self.press();
                 self.press();
+                if self.question().is_some() {
+                    return false;
+                }
                 self.say("yes");
             }
             Question::ClawFull => {
                 self.press();
                 self.act(WorldAskKind::Fill, 1, 0, Heading::Right);
                 self.press();
+                if self.question().is_some() {
+                    return false;
+                }
                 self.say("yes");
             }
             Question::Turn => {
