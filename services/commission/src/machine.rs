@@ -17,14 +17,13 @@
 mod answers;
 mod arm;
 mod shown;
+mod tells;
 
 use core::time::Duration;
 
 use lager_operator::{Driving, For, Ids};
 use lager_orders::{Moment, Reason};
-use lager_topics::{
-    Calibration, Health, Outcome, Part, ProfileState, SteeringOrder, SteeringReport,
-};
+use lager_topics::{Calibration, Health, Outcome, Part, SteeringOrder, SteeringReport};
 use lager_wire::{Centimetres, LineBits, OperatorCommand, RobotProfile};
 
 use crate::answer::{Answer, Way};
@@ -33,6 +32,7 @@ use crate::recent::Recent;
 use crate::step::{Question, Step, Takes};
 use crate::words::Said;
 use crate::{line, range, wheels};
+use tells::{TOLD, is_obeyed};
 
 /// How long the wheels turn when they are lifted.
 const PULSE: Duration = Duration::from_millis(500);
@@ -40,16 +40,12 @@ const PULSE: Duration = Duration::from_millis(500);
 const BEGIN: Duration = Duration::from_secs(1);
 /// How long the boards may take to obey a description.
 const TELL: Duration = Duration::from_secs(5);
-/// A description that was refused is told again after this time: the wheels may just have stopped.
-const RETRY: Duration = Duration::from_millis(200);
 /// How long a calibration may take; the board watches its sensors for 5 s.
 const CALIBRATE: Duration = Duration::from_secs(8);
 /// The longest movement that waits for an answer.
 const LONGEST: Duration = Duration::from_secs(60);
 /// Without a new `link/health` for this long, nobody knows how the boards are.
 const UNHEARD: Duration = Duration::from_secs(2);
-/// The parts of the description that are found out.
-const TOLD: [Part; 3] = Part::ALL;
 
 /// How a robot is built, as far as commissioning finds it out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -269,23 +265,6 @@ impl Commissioning {
         }
     }
 
-    /// To be called with the bridge's answer to [`Effect::Describe`]; `None` if there was none.
-    pub fn described(&mut self, now: Moment, part: Part, outcome: Option<Outcome>) {
-        let asked = self.under_way.take();
-        let is_told = outcome == Some(Outcome::Done);
-        if let Some(told) = self.told.get_mut(part as usize) {
-            *told = asked.filter(|_| is_told);
-        }
-        let State::Tells { since, .. } = self.state else {
-            return;
-        };
-        let pause = if is_told { Duration::ZERO } else { RETRY };
-        self.state = State::Tells {
-            since,
-            due: Some(now.robot + pause),
-        };
-    }
-
     /// To be called with the bridge's answer to [`Effect::Calibrate`]; `None` if there was none.
     pub fn calibrates(&mut self, now: Moment, outcome: Option<Outcome>) {
         match outcome {
@@ -430,18 +409,9 @@ impl Commissioning {
         self.built = self.original;
         self.is_leaving = true;
         self.state = State::Over;
-<<<<<<< HEAD
         if self.is_tried {
-=======
-        if self.has_tried {
->>>>>>> 0788cd7b17b7d0e393de2af30e5b76a900d4490c
             self.tell(now, self.built.robot);
         }
-    }
-
-    /// The arm that the steering board obeys.
-    fn told_arm(&self) -> Option<lager_wire::ArmProfile> {
-        self.told[Part::Arm as usize].map(|told| told.arm)
     }
 
     /// Nobody is there any more: the robot stands, the boards obey what they obeyed before, and a
@@ -507,64 +477,6 @@ impl Commissioning {
         self.tell(now, trial);
     }
 
-    /// Lets the boards obey a description.
-    fn tell(&mut self, now: Moment, robot: RobotProfile) {
-        self.wanted = robot;
-        self.description = None;
-        self.state = State::Tells {
-            since: now.robot,
-            due: Some(now.robot),
-        };
-        self.tell_next(now.robot);
-    }
-
-    /// Tells the next part that a board does not obey yet, one at a time.
-    fn tell_next(&mut self, since: Duration) {
-        if self.under_way.is_some() {
-            self.state = State::Tells { since, due: None };
-            return;
-        }
-        let is_open = |part: &Part| match (part, self.told[*part as usize]) {
-            (_, None) => true,
-            (Part::Steering, Some(told)) => told.steering != self.wanted.steering,
-            (Part::Arm, Some(told)) => told.arm != self.wanted.arm,
-            (Part::Sensors, Some(told)) => told.sensors != self.wanted.sensors,
-        };
-        if let Some(part) = TOLD.into_iter().find(is_open) {
-<<<<<<< HEAD
-            self.under_way = Some(self.wanted);
-            self.is_tried = true;
-=======
-            (self.under_way, self.has_tried) = (Some(self.wanted), true);
->>>>>>> 0788cd7b17b7d0e393de2af30e5b76a900d4490c
-            self.effects.push(Effect::Describe(part, self.wanted));
-            self.state = State::Tells { since, due: None };
-            return;
-        }
-        // Of what came before nobody knows by which description it was made.
-        self.bits.clear();
-        self.readings.clear();
-        self.volts.clear();
-        let listens = core::mem::take(&mut self.listens);
-        self.state = match (self.is_leaving, listens) {
-            (true, _) => State::Over,
-            (false, true) => State::Listens { since: None },
-            (false, false) => State::Asks,
-        };
-    }
-
-    /// A board does not take a description.
-    fn undescribed(&mut self, now: Moment) {
-        self.told = [None; TOLD.len()];
-        self.under_way = None;
-        if self.is_leaving {
-            self.said.push("undescribed".into());
-            self.state = State::Over;
-        } else {
-            self.fall_back(now, "undescribed");
-        }
-    }
-
     /// Ends the step, which begins anew.
     fn fail(&mut self, now: Moment, why: impl Into<Said>) {
         self.said.push(Said::of("ended", [("why", why.into())]));
@@ -609,11 +521,4 @@ impl Commissioning {
         self.driving.ended();
         self.effects.push(Effect::Steer(order));
     }
-}
-
-/// Whether both boards obey what they were told.
-fn is_obeyed(health: &Health) -> bool {
-    [health.steering_profile, health.sensor_profile]
-        .iter()
-        .all(|told| *told == ProfileState::Accepted)
 }

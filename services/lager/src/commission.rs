@@ -114,7 +114,7 @@ impl Robot {
         };
         patience.watchdog.enter("joining the bus");
         let bus = Bus::open(&bus, Role::Operator)?;
-        let bench = Bench::new(bus, self.running.commissioned())?;
+        let bench = Bench::new(&self.configured, bus, self.running.commissioned())?;
         Ok((bench, patience))
     }
 

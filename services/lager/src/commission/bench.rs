@@ -4,7 +4,7 @@
 //! they were told before, unless the person has saved something else. If this process is killed or
 //! hangs, nobody renews the trial either, and the bridge takes it back after [`Ask::TRIAL`].
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use lager_commission::{Answer, Built, Commissioning, Effect, Question, Said, Step, Takes};
@@ -18,8 +18,13 @@ use lager_topics::{
 };
 use lager_wire::RobotProfile;
 
+use crate::config::Config;
+use crate::diagnose;
+
 /// How often a trial is renewed, in robot time.
 const RENEW: Duration = Duration::from_secs(1);
+/// How often it looks whether the robot is up.
+const LOOK: Duration = Duration::from_secs(1);
 
 /// The robot on one side, and [`Commissioning`] on the other.
 pub struct Bench {
@@ -36,14 +41,17 @@ pub struct Bench {
     /// What the boards try of each part, by its number.
     trials: [Option<(Part, RobotProfile)>; Part::ALL.len()],
     renewed: Duration,
+    configured: Config,
+    /// When it looked whether the robot is up.
+    looked: Instant,
 }
 
 impl Bench {
-    /// The robot of `bus`, which is described as `built`.
+    /// The robot of `bus`, which `configured` names, and which is described as `built`.
     ///
     /// # Errors
     /// The ports cannot be opened.
-    pub fn new(bus: Bus, built: Built) -> Result<Self> {
+    pub fn new(configured: &Config, bus: Bus, built: Built) -> Result<Self> {
         Ok(Self {
             hands: Hands::new(&bus)?,
             health: bus.subscriber()?,
@@ -55,6 +63,8 @@ impl Bench {
             kept: None,
             trials: [None; Part::ALL.len()],
             renewed: Duration::ZERO,
+            configured: configured.clone(),
+            looked: Instant::now(),
         })
     }
 
@@ -105,7 +115,15 @@ impl Bench {
     }
 
     /// Hands in what the robot has told.
+    ///
+    /// # Errors
+    /// The bus fails, or the robot is not up any more. Its clock may stand still then, so that
+    /// nothing would ever be late.
     pub fn hear(&mut self) -> Result<()> {
+        if self.looked.elapsed() >= LOOK {
+            self.looked = Instant::now();
+            diagnose::must_be_up(&self.configured)?;
+        }
         while let Some(frame) = self.line.receive()? {
             self.machine.line(self.bus.clock().now(), frame.bits);
         }
