@@ -150,7 +150,12 @@ impl FromStr for Endpoint {
             };
         }
         let (host, port) = place.rsplit_once(':').ok_or_else(wrong)?;
-        let port = port.parse().map_err(|_| wrong())?;
+        let number: u16 = port.parse().map_err(|_| wrong())?;
+        // One spelling of each, without a sign or zeros before it.
+        if number.to_string() != port {
+            return Err(wrong());
+        }
+        let port = number;
         let at = HostPort {
             host: host.to_owned(),
             port,

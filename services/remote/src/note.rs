@@ -270,7 +270,7 @@ mod tests {
             bytes[1] &= ANSWER | LIMITED;
             bytes[2..8].fill(0);
             if let Ok(note) = Note::from_bytes(&bytes) {
-                prop_assert_eq!(note.to_bytes().as_slice(), bytes);
+                prop_assert_eq!(note.to_bytes().to_vec(), bytes);
             }
         }
     }
