@@ -128,8 +128,6 @@ pub struct Commissioning {
     told: [Option<RobotProfile>; TOLD.len()],
     /// What the bridge was asked to tell, and has not answered yet.
     under_way: Option<RobotProfile>,
-    /// Whether anything was told at all.
-    has_tried: bool,
     /// The hash of it in `link/health`, once that has come.
     description: Option<u32>,
     /// The person ends it, and the boards are told what they were told before.
@@ -165,7 +163,6 @@ impl Commissioning {
             is_tried: false,
             told: [None; TOLD.len()],
             under_way: None,
-            has_tried: false,
             description: None,
             is_leaving: false,
             found: Found::default(),

@@ -160,10 +160,12 @@ fn said() -> impl Strategy<Value = Reason> {
 prop_compose! {
     fn commissioning()(
         asked in of(any::<u32>()), step in of(name()), place in of(any::<u8>()),
-        steps in of(any::<u8>()), question in of(name()), takes in of(name()),
+        steps in of(any::<u8>()), question in of(name()), about in of(said()), takes in of(name()),
         moves in of(any::<bool>()), shows in of(said()), why in of(said()), ended in of(said()),
     ) -> Commissioning {
-        Commissioning { asked, step, place, steps, question, takes, moves, shows, why, ended }
+        Commissioning {
+            asked, step, place, steps, question, about, takes, moves, shows, why, ended,
+        }
     }
 }
 
