@@ -618,7 +618,9 @@ fn a_joint_moves_only_while_its_button_is_held_by_mouse_or_key_and_never_after_a
                 person.page.key_down("Enter");
             }
         }
-        wait_for("the joint to move", || (person.servos() != before).then_some(()));
+        wait_for("the joint to move", || {
+            (person.servos() != before).then_some(())
+        });
         match way {
             "mouse" => person.page.mouse("mouseReleased", at),
             _ => person.page.key_up("Enter"),
@@ -628,7 +630,9 @@ fn a_joint_moves_only_while_its_button_is_held_by_mouse_or_key_and_never_after_a
     // Somebody stops the robot while the button is down.
     let before = person.servos();
     person.page.mouse("mousePressed", at);
-    wait_for("the joint to move", || (person.servos() != before).then_some(()));
+    wait_for("the joint to move", || {
+        (person.servos() != before).then_some(())
+    });
     press(&mut person.page, "Escape");
     person.page.wait_for("#stop-said", "both wheels stand");
     person.assert_arm_stands();

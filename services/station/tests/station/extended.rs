@@ -319,13 +319,8 @@ fn only_a_driver_sets_a_robot_up_and_what_moves_by_it_stands_when_he_leaves() {
     let begin = Action::Commission(Commission::Begin);
     let refused = station.act(&r1(), begin).expect_err("nobody drives it");
     assert_eq!(refused, WishRefused::Act(ActRefused::NotDriver));
-    let leaves: [&dyn Fn(&mut Station, Key); 2] = [
-        &|station, key| station.leave_wheel(&r1(), key),
-        // He has fallen silent.
-        &|station, _| station.turn(at(9_000)),
-    ];
     for (moves, told) in [(0, false), (1, true)] {
-        for leave in leaves {
+        for falls_silent in [false, true] {
             let mut station = extended();
             station.turn(at(1_000));
             let key = station.take_wheel(&r1(), "anna").expect("it is free");
@@ -333,7 +328,10 @@ fn only_a_driver_sets_a_robot_up_and_what_moves_by_it_stands_when_he_leaves() {
             assert_eq!(said(&mut station), ["do 1 commission begin"]);
             let how = format!("commission asked=3 step=turn moves={moves}");
             station.heard(LINK, Ok(&how));
-            leave(&mut station, key);
+            match falls_silent {
+                true => station.turn(at(9_000)),
+                false => station.leave_wheel(&r1(), key),
+            }
             let said = said(&mut station);
             assert_eq!(
                 said.contains(&"do 2 commission stand".into()),
