@@ -6,7 +6,7 @@ use std::time::Duration;
 use lager_lines::Name;
 use lager_lines::command::{read_arm, read_wheels};
 use lager_orders::{Action, Commission, Mode, Wheels};
-use lager_station::{ActRefused, Key, Output, Peer, Reply, Saying, Station, Wish, WishRefused};
+use lager_station::{ActRefused, Output, Peer, Reply, Saying, Station, Wish, WishRefused};
 use lager_wire::{OperatorCommand, Speed};
 
 use crate::transcript::warehouse;
