@@ -1,28 +1,21 @@
 //! A person who has only the browser finds out how a robot is built: *Set up a robot*. The robot is a
 //! simulated one that differs in everything, and the test is the person's hands and eyes.
 
-use std::f64::consts::TAU;
+mod person;
+
 use std::fs;
-use std::time::Duration;
 
 use lager_commission::sentences;
-use lager_floor::Heading;
 use lager_plant::{ArmBuild, Build, Ranger};
-use lager_ports::{Client, Subscriber};
-use lager_tests::{Domain, WATCHDOG, children, pid, wait_for};
-use lager_topics::{LinkHealth, Outcome, Truth, TruthPose, WorldAsk, WorldAskKind, WorldRequest};
+use lager_tests::{Domain, children, pid, wait_for};
+use lager_topics::LinkHealth;
 use rustix::process::{Signal, kill_process};
 use serde_json::json;
 
-use crate::browser::Page;
 use crate::keyboard::press;
 use crate::played::Stage;
 use crate::scene::Scene;
-
-/// How far the line sensors are moved to either side, in mm.
-const SWAY: i16 = 60;
-/// The length of the measured drive, in mm.
-const DRIVE: f64 = 600.0;
+use person::{Person, does, open};
 
 /// A robot that differs in everything; its battery is not measured.
 fn other() -> (u64, Build) {
@@ -35,8 +28,7 @@ fn other() -> (u64, Build) {
 }
 
 /// A robot that is built otherwise and that nobody has described, with its panel, and the words of
-/// its configuration for a command. Which servos its arm has stands there: this is found out
-/// elsewhere.
+/// its configuration for a command. Which servos its arm has stands there, and no more of them.
 fn unknown() -> (Scene, String) {
     let (built, build) = other();
     let domain = Domain::new();
@@ -72,276 +64,6 @@ fn arm(build: &ArmBuild) -> String {
         reversed += &format!("{name} = {}\n", build.reversed[index]);
     }
     format!("[arm.servos]\n{servos}[arm.reversed]\n{reversed}")
-}
-
-/// A person at the page, who takes the robot into his hands.
-struct Person {
-    page: Page,
-    truth: Subscriber<TruthPose>,
-    hands: Client<WorldRequest>,
-    seen: Truth,
-    /// Which way the wheels turned last: 'f', 'b' or '0'.
-    ways: [char; 2],
-    /// The number of what was answered last.
-    answered: String,
-}
-
-impl Person {
-    /// Opens the view from the start of the page.
-    fn new(scene: &Scene) -> Self {
-        let mut page = scene.page();
-        open(&mut page);
-        Self {
-            page,
-            truth: scene.bus.subscriber().expect("a topic"),
-            hands: scene.bus.client().expect("a request"),
-            seen: Truth::default(),
-            ways: ['0'; 2],
-            answered: String::new(),
-        }
-    }
-
-    /// Takes the wheel, begins, and makes the robot manual.
-    fn begin(&mut self) {
-        does(&mut self.page, "begin");
-        self.page
-            .wait_until("document.querySelector('#commission').dataset.question === 'ask_boards'");
-        wait_for("the mode to be the hand's", || {
-            self.page
-                .value("document.querySelector('#commission [data-does=manual]')?.click()");
-            self.page.pause();
-            self.page.text("#mode").contains("BY HAND").then_some(())
-        });
-    }
-
-    /// Looks at the robot.
-    fn look(&mut self) {
-        while let Some(truth) = self.truth.receive().expect("readable") {
-            self.seen = *truth;
-            let speeds = [truth.left_mm_per_s, truth.right_mm_per_s];
-            for (way, speed) in self.ways.iter_mut().zip(speeds) {
-                match speed {
-                    20.0.. => *way = 'f',
-                    ..-20.0 => *way = 'b',
-                    _ => {}
-                }
-            }
-        }
-    }
-
-    /// Where the servos of the arm are.
-    fn servos(&mut self) -> [u16; 8] {
-        self.look();
-        self.seen.servo_position
-    }
-
-    /// Once what was given before has had its time, the arm stands for half a second.
-    fn assert_arm_stands(&mut self) {
-        self.pause();
-        let before = self.servos();
-        std::thread::sleep(Duration::from_millis(500));
-        assert_eq!(self.servos(), before);
-    }
-
-    /// What is asked, once something else is asked than was answered last and can be answered.
-    fn question(&mut self) -> Option<String> {
-        let now = self.page.value(
-            "(() => { const view = document.querySelector('#commission'); \
-             const is = view.querySelector('.answers :is(button, input):not(:disabled)') !== null; \
-             return is ? [view.dataset.asked, view.dataset.question] : ['', '']; })()",
-        );
-        let [asked, question] =
-            [0, 1].map(|part| now[part].as_str().unwrap_or_default().to_owned());
-        (!question.is_empty() && asked != self.answered).then_some(question)
-    }
-
-    fn asked(&mut self) -> String {
-        wait_for("a question", || {
-            self.look();
-            self.question()
-        })
-    }
-
-    /// Notes what is answered now.
-    fn answering(&mut self) {
-        let asked = self
-            .page
-            .value("document.querySelector('#commission').dataset.asked");
-        self.answered = asked.as_str().unwrap_or_default().to_owned();
-    }
-
-    fn yes(&mut self) {
-        self.answering();
-        self.page.click("#commission .answers [data-does=yes]");
-    }
-
-    fn number(&mut self, number: &str) {
-        self.answering();
-        self.page.fill("#commission .answers input", number);
-        self.page.click("#commission .answers [data-does=set]");
-    }
-
-    /// Takes the time that a sensor needs to see what has been done.
-    fn pause(&self) {
-        std::thread::sleep(Duration::from_millis(800));
-    }
-
-    /// Does something with the hands.
-    fn act(&mut self, kind: WorldAskKind, x: u8, y: u8) {
-        let ask = WorldAsk {
-            kind: kind.into(),
-            x,
-            y,
-            heading: Heading::Right.into(),
-            ..WorldAsk::default()
-        };
-        let answer = wait_for("the world", || self.hands.call(ask, WATCHDOG / 100).ok());
-        assert_eq!(answer.outcome, Outcome::Done, "{kind:?}: {answer:?}");
-    }
-
-    /// Puts it down so far to the left of where it stands, in mm.
-    fn shift(&mut self, left: i16) {
-        let x = u8::try_from(left + 128).expect("a small step");
-        self.act(WorldAskKind::Shift, x, 0);
-    }
-
-    fn place(&mut self, x: u8, y: u8) {
-        self.act(WorldAskKind::Place, x, y);
-    }
-
-    /// Moves the line sensors over tape and floor until something else is asked.
-    fn sway(&mut self) {
-        for step in (0..).map(|step: i16| step % 24) {
-            if step == 0 {
-                self.place(0, 0);
-                self.shift(-SWAY);
-            }
-            self.shift(if step < 12 { 10 } else { -10 });
-            if self.question().is_some() {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(60));
-        }
-    }
-
-    /// Answers at the moment when the robot is there, unless it stands and is to begin anew.
-    fn watch(&mut self, question: &str, is_there: impl Fn(&Truth) -> bool) {
-        let goes_on = wait_for("the end of a movement", || {
-            self.look();
-            let asked = self
-                .page
-                .value("document.querySelector('#commission').dataset.question");
-            match asked == question {
-                true => is_there(&self.seen).then_some(true),
-                false => Some(false),
-            }
-        });
-        if goes_on {
-            self.answering();
-            self.page
-                .value("document.querySelector('#commission [data-does=now]')?.click()");
-        }
-    }
-
-    /// Answers what is asked, from what is seen. Returns whether it was the last question.
-    fn answer(&mut self, question: &str) -> bool {
-        self.look();
-        let begun = self.seen;
-        match question {
-            "ask_boards" | "ask_finish" => self.yes(),
-            "ask_line_sway" => {
-                self.yes();
-                self.sway();
-            }
-            "ask_line_floor" | "ask_line_tape" => {
-                self.place(0, 0);
-                if question == "ask_line_floor" {
-                    self.shift(100);
-                }
-                self.pause();
-                self.yes();
-            }
-            "ask_range_far" | "ask_range_near" => {
-                let cm = if question == "ask_range_far" { 30 } else { 20 };
-                self.act(WorldAskKind::Hold, cm, 0);
-                self.pause();
-                self.number(&cm.to_string());
-            }
-            "ask_wheels_ahead" | "ask_wheels_left" => {
-                self.act(WorldAskKind::Lift, 0, 0);
-                self.pause();
-                self.look();
-                self.ways = ['0'; 2];
-                self.yes();
-            }
-            "ask_saw_ahead" | "ask_saw_left" => {
-                self.answering();
-                for (side, way) in ["left", "right"].into_iter().zip(self.ways) {
-                    let choice = format!("#commission input[name={side}][value='{way}']");
-                    self.page.click(&choice);
-                }
-                self.page.click("#commission .answers [data-does=set]");
-            }
-            "ask_battery" => {
-                self.answering();
-                self.page.click("#commission .answers [data-does=no]");
-            }
-            "ask_turn" => {
-                self.place(1, 1);
-                self.pause();
-                self.yes();
-            }
-            "ask_turn_round" => {
-                self.watch(question, |truth| {
-                    truth.heading_rad - begun.heading_rad >= TAU
-                });
-            }
-            "ask_speed" => {
-                self.place(0, 0);
-                self.pause();
-                self.number(&format!("{:.0}", DRIVE / 10.0));
-            }
-            "ask_speed_there" => {
-                self.watch(question, |truth| truth.x_mm - begun.x_mm >= DRIVE);
-            }
-            // What this person knows nothing of stays as it is described.
-            _ => {
-                self.answering();
-                does(&mut self.page, "skip");
-            }
-        }
-        question == "ask_finish"
-    }
-
-    /// Goes on until this is asked.
-    fn until(&mut self, wanted: &str) {
-        loop {
-            let question = self.asked();
-            if question == wanted {
-                return;
-            }
-            match question.as_str() {
-                "ask_boards" => self.yes(),
-                _ => {
-                    self.answering();
-                    does(&mut self.page, "skip");
-                }
-            }
-        }
-    }
-}
-
-/// Opens the view as somebody who looks for it.
-fn open(page: &mut Page) {
-    page.click("#tab-setup");
-    page.click_until(
-        "#commission-open",
-        "document.querySelector('#commission:not([hidden]) [data-does]') !== null",
-    );
-}
-
-fn does(page: &mut Page, what: &str) {
-    page.click(&format!("#commission [data-does={what}]:not(:disabled)"));
 }
 
 /// A sentence of the robot's table in Swedish.
