@@ -20,7 +20,8 @@
 //! while it moves.
 //!
 //! A request may have a part told otherwise, to try it on the robot ([`Profiles::describe`]). That
-//! ends with this bridge: a successor tells what is configured.
+//! ends when nobody renews it ([`Profiles::lapse`]), and with this bridge: a successor tells what is
+//! configured.
 //!
 //! It is pure. It stands apart from the other settings because it is one thing in many packets.
 

@@ -1,6 +1,6 @@
 //! Boards whose ports nobody has named, among devices of other kinds.
 
-use std::fs::{File, create_dir};
+use std::fs::{File, create_dir, read_to_string};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -178,7 +178,13 @@ fn holder(pty: &Pty) -> Child {
         .arg("600")
         .stdin(Stdio::from(pty.slave()))
         .spawn();
-    program.unwrap()
+    let program = program.unwrap();
+    // For a moment a new program still has the name of the thread that started it.
+    let name = format!("/proc/{}/comm", program.id());
+    while read_to_string(&name).unwrap() != "sleep\n" {
+        std::thread::yield_now();
+    }
+    program
 }
 
 #[test]
