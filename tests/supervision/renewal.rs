@@ -47,6 +47,12 @@ fn a_robot_that_gets_another_world_stands_whatever_happens_meanwhile() {
     // Somebody has made the file unfit since the station has looked: it stands where it is.
     let logic = service(&mut up, "logic", None);
     assert_eq!(stop_of(&domain), None);
+    // `up` hears of an order a moment after the robot.
+    let kept = domain.bus_folder().join(".state/r1/orders.toml");
+    wait_for("the order to be kept", || {
+        let text = fs::read_to_string(&kept).ok()?;
+        text.contains("product = 2").then_some(())
+    });
     save("size = [2, 2");
     renew(&up);
     wait_for("the reason", || {

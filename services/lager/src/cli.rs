@@ -27,14 +27,15 @@ pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 pub use board::{BoardArgs, BoardCommand, FlashArgs, PortArgs, ResetArgs, UpdateArgs};
 pub use commission::CommissionArgs;
 pub use gateway::GatewayArgs;
-pub use keys::{KeysArgs, KeysCommand};
+pub use keys::KeysArgs;
+#[cfg(feature = "zenoh")]
+pub use keys::KeysCommand;
 pub use ordered::{Button, MapChange, ObstacleChange, Ordered, Plain, QueueChange};
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
 pub use report::ReportArgs;
 pub use simulate::SimulateArgs;
 pub use top::TopArgs;
 pub use topic::{TopicArgs, TopicCommand};
-
 pub use values::{Fetch, at_speed};
 
 use crate::config::{Body, flag};

@@ -66,7 +66,8 @@ pub(crate) struct Plan<F> {
     pub(crate) pace: Pace,
     /// The head line; empty for none.
     pub(crate) head: &'static str,
-    /// Whether it compares stamps with this machine's clock.
+    /// Whether it compares stamps with this machine's clock, which a robot elsewhere has not.
+    #[cfg_attr(not(feature = "zenoh"), expect(dead_code))]
     pub(crate) needs_clock: bool,
     /// Makes a gauge for payloads of this many bytes.
     pub(crate) gauge: F,
