@@ -160,7 +160,8 @@ impl Rig {
         let mut delay = || spread.bits() % START_SPREAD;
         let sensor = Chip::new(&images.sensor, delay(), options.seed)?;
         let steering = Chip::new(&images.steering, delay(), !options.seed)?;
-        let world = World::new(&options.warehouse, options.seed, options.make, RESTING)?.built(options.build);
+        let world = World::new(&options.warehouse, options.seed, options.make, RESTING)?
+            .built(options.build);
         let world = Rc::new(RefCell::new(world));
         let epoch = Rc::new(Epoch::default());
         let inputs = boards::connect_inputs(&sensor, &world, &epoch);
