@@ -33,7 +33,7 @@ fn main() {
                         });
                         let samples = usize::try_from(samples).unwrap_or(usize::MAX);
                         match session.round(index, samples) {
-                            Ok(times) => Duration::from_nanos(times.iter().sum()),
+                            Ok(taken) => Duration::from_nanos(taken.service.iter().sum()),
                             Err(error) => panic!("{error}"),
                         }
                     });

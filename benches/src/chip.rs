@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::error::BenchError;
-use crate::machine;
+use crate::machine::Machine;
 
 /// The baud rates for which there are images: the default one and the original boards'.
 pub const BAUDS: [u32; 2] = [500_000, 9_600];
@@ -147,7 +147,7 @@ pub fn measure(programs: [(u32, Programs); BAUDS.len()]) -> Result<ChipReport, B
         .map(|(baud, programs)| std::thread::spawn(move || trace(&programs, baud)))
         .map(|trace| trace.join().expect("nothing here panics"));
     let mut report = ChipReport {
-        machine: machine::describe(),
+        machine: Machine::here().to_string(),
         figures: Vec::new(),
         rustc: String::new(),
     };

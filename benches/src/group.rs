@@ -3,17 +3,18 @@
 //!
 //! This file alone defines how a measurement runs: `lager bench` and the guard run whole groups
 //! ([`Group::measure`]), criterion times single rows ([`Group::open`]). The scenario defines a
-//! round; nothing here reads a clock.
+//! round; nothing here times a sample.
 
 use core::time::Duration;
 use std::io::{IsTerminal, Write};
+use std::time::Instant;
 
 use lager_rig::{Watch, heed_interrupts, interrupted};
 
 use crate::error::BenchError;
 use crate::machine::kept_awake;
-use crate::report::{Mode, Options, Ratio, Regime, Row};
-use crate::stats::{Quantiles, median};
+use crate::report::{Mode, Options, Rate, Ratio, Regime, Row, Run, Spread};
+use crate::stats::{Distribution, median};
 
 /// From this time on a core was held up. A robot's leases and reports are as long, so it stands.
 const HELD_UP: Duration = Duration::from_millis(100);
@@ -44,14 +45,57 @@ impl Entry {
     }
 }
 
+/// The times of one round of a row, in ns; see [`crate::plan`] for the two kinds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Taken {
+    /// From when each sample was sent.
+    pub service: Vec<u64>,
+    /// From when each was due; empty if the samples are sent as fast as they come back.
+    pub response: Vec<u64>,
+    /// Samples that came before they were sent, by the clock. They are in neither.
+    pub disordered: u64,
+    /// Samples a second: planned and sent. `None` if they are sent as fast as they come back.
+    pub rate: Option<Rate>,
+}
+
+impl Taken {
+    /// The times of samples that were due every `period` ns: when each was due, sent and received.
+    pub(crate) fn paced(period: u64, samples: impl IntoIterator<Item = [u64; 3]>) -> Self {
+        let mut taken = Self::default();
+        let (mut first, mut last, mut n) = (None, 0, 0_u32);
+        for [due, sent, received] in samples {
+            taken.add(Some(due), sent, received);
+            (last, n) = (sent, n + 1);
+            first = first.or(Some(sent));
+        }
+        let took = last.saturating_sub(first.unwrap_or(last));
+        taken.rate = (took > 0).then(|| Rate {
+            asked_hz: 1e9 / period as f64,
+            reached_hz: f64::from(n - 1) * 1e9 / took as f64,
+        });
+        taken
+    }
+
+    /// Adds a sample by the clock's readings.
+    pub(crate) fn add(&mut self, due: Option<u64>, sent: u64, received: u64) {
+        let Some(service) = received.checked_sub(sent) else {
+            self.disordered += 1;
+            return;
+        };
+        self.service.push(service);
+        self.response
+            .extend(due.map(|due| service + sent.saturating_sub(due)));
+    }
+}
+
 /// The processes that are open while a group is measured. It stays in the thread that opened it:
 /// the processes end with that thread, which may also be bound to a core.
 pub trait Session {
-    /// Measures the entry with that index `samples` times; returns how long each took, in ns.
+    /// Measures the entry with that index `samples` times.
     ///
     /// # Errors
     /// A process or the carrier failed; the session cannot be used any more.
-    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError>;
+    fn round(&mut self, index: usize, samples: usize) -> Result<Taken, BenchError>;
 
     /// Adds further figures to the rows when everything is measured.
     ///
@@ -132,10 +176,18 @@ impl Group {
     ) -> Result<Vec<Row>, BenchError> {
         let (what, regime, entries) = (&self.what, self.regime, &self.entries);
         let thorough = usize::from(!options.quick);
-        let mut runs: Vec<Vec<Quantiles>> = vec![Vec::new(); entries.len()];
+        let samples = options.samples.unwrap_or(self.samples[thorough]);
+        let mut runs: Vec<Vec<Run>> = vec![Vec::new(); entries.len()];
         let count = options.runs.max(1);
+        let began = Instant::now();
         for run in 0..count {
-            let mut samples: Vec<Vec<u64>> = vec![Vec::new(); entries.len()];
+            let from_s = began.elapsed().as_secs_f64();
+            for own in &mut runs {
+                own.push(Run {
+                    from_s,
+                    ..Run::default()
+                });
+            }
             for turn in 0..self.rounds[thorough] {
                 for place in 0..entries.len() {
                     if interrupted() {
@@ -145,48 +197,72 @@ impl Group {
                     let entry = &entries[index];
                     let row = format!("{what} {} {regime}: {}", entry.mode, entry.label);
                     tell(&format!("{row}, run {} of {count}", run + 1));
-                    samples[index].extend(session.round(index, self.samples[thorough])?);
+                    runs[index][run].add(session.round(index, samples)?);
                 }
             }
-            for (index, samples) in samples.iter_mut().enumerate() {
-                runs[index].extend(Quantiles::of(samples));
+            for own in &mut runs {
+                own[run].took_s = began.elapsed().as_secs_f64() - from_s;
             }
         }
         tell("");
-        Ok(rows(what, regime, entries, &runs))
+        Ok(rows(what, regime, entries, runs))
     }
 }
 
 /// The rows of the results: `runs` holds each entry's runs, the same number of each.
-fn rows(what: &str, regime: Regime, entries: &[Entry], runs: &[Vec<Quantiles>]) -> Vec<Row> {
-    let row = |(entry, own): (&Entry, &Vec<Quantiles>)| {
-        let times = Quantiles::over(own)?;
+fn rows(what: &str, regime: Regime, entries: &[Entry], runs: Vec<Vec<Run>>) -> Vec<Row> {
+    let ratios = |(index, entry): (usize, &Entry)| -> Vec<Ratio> {
         let ratio_to = |label: &&str| {
             let other = entries.iter().position(|other| other.label == *label)?;
-            ratio(label, own, &runs[other])
+            ratio(label, &runs[index], &runs[other])
         };
-        Some(Row {
-            ratios: entry.against.iter().filter_map(ratio_to).collect(),
+        entry.against.iter().filter_map(ratio_to).collect()
+    };
+    let ratios: Vec<_> = entries.iter().enumerate().map(ratios).collect();
+    let row = |((entry, runs), ratios): ((&Entry, Vec<Run>), Vec<Ratio>)| {
+        let merged = |of: fn(&Run) -> &Distribution| {
+            let mut all = Distribution::default();
+            runs.iter().for_each(|run| all.add(of(run)));
+            all.quantiles()
+        };
+        let service = merged(|run| &run.service);
+        let response = merged(|run| &run.response);
+        let paced = response.n > 0;
+        let times = if paced { response } else { service };
+        (times.n > 0).then(|| Row {
+            service: paced.then_some(service),
+            spread: Spread::over(&runs),
+            rate: Rate::over(runs.iter().flat_map(|run| &run.rates)),
+            disordered: runs.iter().map(|run| run.disordered).sum(),
+            ratios,
+            runs,
             ..Row::new(what, entry.label, entry.mode, regime, times)
         })
     };
-    entries.iter().zip(runs).filter_map(row).collect()
+    let entries = entries.iter().zip(runs).zip(ratios);
+    entries.filter_map(row).collect()
 }
 
-/// The median of each run's ratio, in which a drift from run to run cancels.
-fn ratio(to: &str, own: &[Quantiles], other: &[Quantiles]) -> Option<Ratio> {
-    let by = |own: u64, other: u64| own as f64 / other as f64;
-    let runs: Vec<[f64; 2]> = own
-        .iter()
-        .zip(other)
-        // If the clock is too coarse for the samples, there are no ratios.
-        .filter(|(_, other)| other.p50_ns > 0)
-        .map(|(own, other)| [by(own.p50_ns, other.p50_ns), by(own.p99_ns, other.p99_ns)])
+/// The median of each run's ratio, in which a drift from run to run cancels. It compares service
+/// times: what the software takes for one sample. A stall of the machine hits one of two rows that
+/// take turns, so in response times it would be the ratio of their luck.
+fn ratio(to: &str, own: &[Run], other: &[Run]) -> Option<Ratio> {
+    let by = |percent| {
+        move |(own, other): (&Run, &Run)| {
+            let at = |run: &Run| run.service.percentile(percent);
+            // If the clock is too coarse for the samples, there are no ratios.
+            let other = at(other).filter(|ns| *ns > 0)?;
+            Some(at(own)? as f64 / other as f64)
+        }
+    };
+    let pairs = || own.iter().zip(other);
+    let runs: Vec<_> = pairs()
+        .filter_map(|pair| Some((by(50.0)(pair)?, by(99.0)(pair))))
         .collect();
     Some(Ratio {
         to: to.to_owned(),
-        p50: median(runs.iter().map(|run| run[0]).collect())?,
-        p99: median(runs.iter().map(|run| run[1]).collect())?,
+        p50: median(runs.iter().map(|run| run.0).collect())?,
+        p99: median(runs.iter().filter_map(|run| run.1).collect()),
         runs,
     })
 }
@@ -213,8 +289,12 @@ mod tests {
     struct Planned<R>(R);
 
     impl<R: FnMut(usize) -> Result<Vec<u64>, BenchError>> Session for Planned<R> {
-        fn round(&mut self, index: usize, _: usize) -> Result<Vec<u64>, BenchError> {
-            (self.0)(index)
+        fn round(&mut self, index: usize, _: usize) -> Result<Taken, BenchError> {
+            let service = (self.0)(index)?;
+            Ok(Taken {
+                service,
+                ..Taken::default()
+            })
         }
     }
 
@@ -262,9 +342,33 @@ mod tests {
         })
         .unwrap();
         assert_eq!(rows[0].ratios[0].to, "iceoryx2/header");
-        assert!((rows[0].ratios[0].p50 - 1.2).abs() < 1e-9, "{rows:?}");
-        assert_eq!((rows[0].times.n, rows[0].times.p50_ns), (300, 1200));
+        assert!((rows[0].ratios[0].p50 - 1.2).abs() < 1e-3, "{rows:?}");
+        assert_eq!(rows[0].ratios[0].p99, None, "a run has 100 samples");
+        assert_eq!((rows[0].times.n, rows[0].times.p50_ns), (300, Some(1200)));
+        let spread = rows[0].spread.unwrap();
+        assert!(spread.p50_ns[0] == 120 && spread.p50_ns[1] >= 12_000);
         assert_eq!(rows[1].ratios, []);
+    }
+
+    #[test]
+    fn a_sample_that_came_before_it_was_sent_is_counted_and_in_no_percentile() {
+        let taken = Taken::paced(100, [[0, 0, 30], [100, 100, 90], [200, 250, 290]]);
+        assert_eq!((taken.service, taken.disordered), (vec![30, 40], 1));
+        assert_eq!(taken.response, [30, 90]);
+    }
+
+    #[test]
+    fn a_rate_that_was_not_reached_is_told_from_one_that_stumbled() {
+        let due = |number: u64| number * 1_000;
+        let reached = |sent: &dyn Fn(u64) -> u64| {
+            let samples = (0..1_000).map(|number| [due(number), sent(number), sent(number) + 10]);
+            Taken::paced(1_000, samples).rate.unwrap()
+        };
+        // Twice as long for each sample; and one stall, after which it has caught up.
+        let slow = reached(&|number| 2 * due(number));
+        let stumbled = reached(&|number| due(number) + if number == 500 { 900 } else { 0 });
+        assert!(slow.overload() && !stumbled.overload(), "{slow:?} {stumbled:?}");
+        assert!((slow.reached_hz - 500_000.0).abs() < 1.0, "{slow:?}");
     }
 
     #[test]

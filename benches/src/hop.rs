@@ -118,14 +118,17 @@ pub(crate) fn beside_its_parts(rows: &mut [Row]) {
     else {
         return;
     };
-    let ratio = |figure: fn(&Row) -> u64| {
-        figure(&rows[hop]) as f64 / (figure(&rows[futex]) + figure(&rows[polled])) as f64
+    let ratio = |percentile: fn(&Row) -> Option<u64>| {
+        let parts = percentile(&rows[futex])? + percentile(&rows[polled])?;
+        Some(percentile(&rows[hop])? as f64 / parts as f64)
     };
-    let [p50, p99] = [ratio(|row| row.times.p50_ns), ratio(|row| row.times.p99_ns)];
+    let (Some(p50), p99) = (ratio(|row| row.times.p50_ns), ratio(|row| row.times.p99_ns)) else {
+        return;
+    };
     rows[hop].ratios.push(Ratio {
         to: ITS_PARTS.to_owned(),
         p50,
         p99,
-        runs: vec![[p50, p99]],
+        runs: vec![(p50, p99)],
     });
 }

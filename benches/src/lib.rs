@@ -13,15 +13,18 @@
 
 mod baseline;
 pub mod chip;
+pub mod compare;
 pub mod error;
 mod group;
 mod hop;
 pub mod machine;
 mod pair;
 mod path;
+mod plan;
 mod publish;
 pub mod report;
 mod sample;
+pub mod saved;
 mod scenario;
 pub mod slow;
 pub mod stats;
@@ -29,12 +32,12 @@ pub mod steps;
 pub mod times;
 
 pub use error::BenchError;
-pub use group::{Entry, Group, Opened, Session};
+pub use group::{Entry, Group, Opened, Session, Taken};
 pub use lager_rig::{Domain, heed_interrupts, interrupted};
 pub use path::may_have_real_time;
-pub use report::{Mode, Options, Ratio, Regime, Report, Row};
+pub use report::{Mode, Options, Rate, Ratio, Regime, Report, Row, Run};
 pub use scenario::Scenario;
-pub use stats::{Quantiles, median};
+pub use stats::{Distribution, Quantiles, median};
 
 /// The prefix of the folders of measurements.
 pub const FAMILY: &str = "lager-bench";

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use crate::baseline::LIMIT;
 use crate::baseline::memory::Lanes;
 use crate::error::{BenchError, Fault, no_bus};
-use crate::group::{Entry, Opened, Session};
+use crate::group::{Entry, Opened, Session, Taken};
 use crate::machine;
 use crate::report::Regime;
 
@@ -83,6 +83,11 @@ impl<X> Round<X> {
         (1..=u64::from(self.warm_up) + u64::from(self.samples)).map(move |sample| base + sample)
     }
 
+    /// Whether sample `number` is the first timed one.
+    pub(crate) fn is_first_timed(&self, number: u64) -> bool {
+        number & u64::from(u32::MAX) == u64::from(self.warm_up) + 1
+    }
+
     /// The error of sample `number`.
     pub(crate) fn failed(&self, number: u64, fault: Fault) -> BenchError {
         let in_round = |number: u64| number & u64::from(u32::MAX);
@@ -94,6 +99,22 @@ impl<X> Round<X> {
                 other => other,
             },
         }
+    }
+}
+
+/// What one of the two processes has noted of a round's samples.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Noted {
+    /// The time of each sample, in ns. If both processes note some, readings of the clock: when it
+    /// was sent and when it was received.
+    pub(crate) times: Vec<u64>,
+    /// When each was due, and the time between two that are, if there is a plan; in ns.
+    pub(crate) due: Option<(Vec<u64>, u64)>,
+}
+
+impl From<Vec<u64>> for Noted {
+    fn from(times: Vec<u64>) -> Self {
+        Self { times, due: None }
     }
 }
 
@@ -141,9 +162,9 @@ pub(crate) fn open<X: Serialize + 'static>(
 }
 
 impl<X: Serialize> Session for Pair<X> {
-    /// The first process's times. If the second process returns times, both return readings of the
+    /// The first process's times. If the second process notes times, both note readings of the
     /// clock, and the result is the time from the first's to the second's.
-    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
+    fn round(&mut self, index: usize, samples: usize) -> Result<Taken, BenchError> {
         // Each process ends a wait by itself, except a bare `read`, which has no time-out. For that
         // one the parent waits ten times as long for a sample as the slowest machine should need.
         const SAMPLE: Duration = Duration::from_millis(1);
@@ -160,21 +181,29 @@ impl<X: Serialize> Session for Pair<X> {
         let limit = Duration::from_secs(60) + SAMPLE * (round.warm_up + samples);
         self.first.tell(&round);
         self.second.tell(&round);
-        let (sent, received): (Vec<u64>, Vec<u64>) =
+        let (sent, received): (Noted, Noted) =
             Process::both(&mut self.first, &mut self.second, limit)?;
-        if received.is_empty() {
-            return Ok(sent);
+        let mut taken = Taken::default();
+        if received.times.is_empty() {
+            taken.service = sent.times;
+            return Ok(taken);
         }
-        assert_eq!(sent.len(), received.len(), "each has a time at each end");
-        let way = |(sent, received): (u64, u64)| received.saturating_sub(sent);
-        Ok(sent.into_iter().zip(received).map(way).collect())
+        assert_eq!(sent.times.len(), received.times.len(), "a time at each end");
+        let ways = sent.times.into_iter().zip(received.times);
+        if let Some((due, period)) = sent.due {
+            let all = due.into_iter().zip(ways);
+            let sample = |(due, (sent, received))| [due, sent, received];
+            return Ok(Taken::paced(period, all.map(sample)));
+        }
+        ways.for_each(|(sent, received)| taken.add(None, sent, received));
+        Ok(taken)
     }
 }
 
 /// One of the two processes: binds itself to its core, and measures the parent's rounds.
 pub(crate) fn measure<X: DeserializeOwned>(
     parent: &mut Parent,
-    round: fn(&Side, &Round<X>) -> Result<Vec<u64>, BenchError>,
+    round: fn(&Side, &Round<X>) -> Result<Noted, BenchError>,
 ) -> Result<(), Box<dyn Error>> {
     let setup: Setup = parent.told()?;
     pin(setup.core)?;
@@ -186,13 +215,12 @@ pub(crate) fn measure<X: DeserializeOwned>(
     };
     parent.say(&())?;
     while let Some(told) = parent.hear::<Round<X>>()? {
-        let times = round(&side, &told)?;
+        let mut noted = round(&side, &told)?;
         // The times of the warm-up samples do not count.
-        let counted: &[u64] = match &*times {
-            [] => &[],
-            times => &times[told.warm_up as usize..],
-        };
-        parent.say(&counted)?;
+        if !noted.times.is_empty() {
+            noted.times.drain(..told.warm_up as usize);
+        }
+        parent.say(&noted)?;
     }
     Ok(())
 }

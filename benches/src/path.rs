@@ -32,10 +32,10 @@ mod turn;
 use lager_rig::schedule::{Bound, NoRealTime, Placement, RealTime};
 
 use crate::error::BenchError;
-use crate::group::{Entry, Group, Session};
+use crate::group::{Entry, Group, Session, Taken};
 use crate::machine::cores_for;
 use crate::report::{Mode, Options, Regime, Row};
-use crate::stats::Quantiles;
+use crate::stats::Distribution;
 use floor::Floor;
 use robot::{Places, Robot};
 use turn::{Chain, TURN, turn};
@@ -44,7 +44,7 @@ pub(crate) use floor::PROCESSES as FLOOR_PROCESSES;
 pub(crate) use services::PROCESSES;
 
 /// Turns of each chain in one run: with `--quick`, and without.
-const TURNS: [usize; 2] = [2, 8];
+const TURNS: [usize; 2] = [4, 8];
 
 /// SCHED_FIFO priorities. The boards stand for hardware, so they run before all of the robot.
 const SERVICES: u8 = 40;
@@ -141,7 +141,7 @@ impl Chains {
 }
 
 impl Session for Chains {
-    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
+    fn round(&mut self, index: usize, samples: usize) -> Result<Taken, BenchError> {
         turn(&mut *self.chains[index], samples)
     }
 
@@ -154,7 +154,8 @@ impl Session for Chains {
                 row.cpu_percent = chain.processes().cpu_percent();
             }
             if let Some(overtaken) = chain.overtaken() {
-                let times = Quantiles::of(&mut overtaken.to_vec()).unwrap_or_default();
+                let times: Distribution = overtaken.iter().copied().collect();
+                let times = times.quantiles();
                 let what = "path-overtaken";
                 more.push(Row::new(what, &row.label(), row.mode, self.regime, times));
             }

@@ -9,7 +9,8 @@ use clap::ValueEnum;
 use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
-use crate::stats::Quantiles;
+use crate::group::Taken;
+use crate::stats::{Distribution, Quantiles, median};
 
 /// How the receiver waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
@@ -64,10 +65,12 @@ impl Mode {
 /// The options of a measurement: what to measure, and how often.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Runs, at least 1; every figure is the median over them.
+    /// Runs, at least 1; the times of all runs add up, and a ratio is the median over them.
     pub runs: usize,
     /// Few samples, for a first look or a check that everything works.
     pub quick: bool,
+    /// Samples of each round, if not the scenario's own number.
+    pub samples: Option<usize>,
     /// The modes to measure.
     pub modes: Vec<Mode>,
     /// The regimes to measure.
@@ -80,24 +83,119 @@ impl Default for Options {
         Self {
             runs: 5,
             quick: false,
+            samples: None,
             modes: Mode::value_variants().to_vec(),
             regimes: Regime::value_variants().to_vec(),
         }
     }
 }
 
-/// A row's times divided by those of another row of the same run.
+/// A row's service times divided by those of another row of the same run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
     /// The label of the other row; see [`Row::label`].
     pub to: String,
     /// The median over the runs of this row's p50 divided by the other's.
     pub p50: f64,
-    /// The same for the p99.
-    pub p99: f64,
+    /// The same for the p99; `None` if no run has enough samples for it.
+    pub p99: Option<f64>,
     /// Both ratios of each run.
     #[serde(default)]
-    pub runs: Vec<[f64; 2]>,
+    pub runs: Vec<(f64, Option<f64>)>,
+}
+
+/// Samples a second.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rate {
+    /// That were due.
+    pub asked_hz: f64,
+    /// That were sent.
+    pub reached_hz: f64,
+}
+
+impl Rate {
+    /// The median of what the rounds reached: one stall at the end of a round is not yet a machine
+    /// that cannot do it.
+    pub(crate) fn over<'a>(rounds: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
+        let asked_hz = rounds.clone().next()?.asked_hz;
+        let reached_hz = median(rounds.map(|rate| rate.reached_hz).collect())?;
+        Some(Self {
+            asked_hz,
+            reached_hz,
+        })
+    }
+
+    /// Whether less than 99 % of what was asked was reached. Such times say how long the backlog
+    /// grew, and nothing about the software at that rate.
+    #[must_use]
+    pub fn overload(&self) -> bool {
+        self.reached_hz < 0.99 * self.asked_hz
+    }
+}
+
+/// The times of a row in one run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// From when each sample was sent.
+    pub service: Distribution,
+    /// From when each was due; empty if the samples have no plan.
+    pub response: Distribution,
+    /// Samples that came before they were sent, by the clock.
+    #[serde(default)]
+    pub disordered: u64,
+    /// The rate of each round.
+    #[serde(default)]
+    pub rates: Vec<Rate>,
+    /// When it began, in seconds since the measurement's beginning.
+    #[serde(default)]
+    pub from_s: f64,
+    /// How long it took in seconds, with the turns of the other rows.
+    #[serde(default)]
+    pub took_s: f64,
+}
+
+impl Run {
+    /// Adds a round.
+    pub(crate) fn add(&mut self, taken: Taken) {
+        self.service.extend(taken.service);
+        self.response.extend(taken.response);
+        self.disordered += taken.disordered;
+        self.rates.extend(taken.rate);
+    }
+
+    /// What a person waits for who asks for the row's times: response times where there is a plan.
+    #[must_use]
+    pub fn times(&self) -> &Distribution {
+        match self.response.quantiles().n {
+            0 => &self.service,
+            _ => &self.response,
+        }
+    }
+}
+
+/// The lowest and the highest figure of the runs, in ns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Of each run's p50.
+    pub p50_ns: [u64; 2],
+    /// Of each run's p99; `None` if no run has enough samples for it.
+    pub p99_ns: Option<[u64; 2]>,
+}
+
+impl Spread {
+    /// `None` for a single run, and if no run has enough samples.
+    pub(crate) fn over(runs: &[Run]) -> Option<Self> {
+        let ends = |percent| {
+            let of = |run: &Run| run.times().percentile(percent);
+            let figures = || runs.iter().filter_map(of);
+            Some([figures().min()?, figures().max()?])
+        };
+        (runs.len() > 1).then_some(())?;
+        Some(Self {
+            p50_ns: ends(50.0)?,
+            p99_ns: ends(99.0),
+        })
+    }
 }
 
 /// The figures of one carrier in one mode and regime.
@@ -115,15 +213,36 @@ pub struct Row {
     pub mode: Mode,
     /// How the two processes shared the processor.
     pub regime: Regime,
-    /// The number of samples of all runs, and each figure's median over the runs.
+    /// The times of all runs together: from when a sample was due where there is a plan, otherwise
+    /// from when it was sent.
     #[serde(flatten)]
     pub times: Quantiles,
+    /// The times from when a sample was sent, where there is a plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub service: Option<Quantiles>,
+    /// How far the runs lie apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread: Option<Spread>,
+    /// The rate, where there is a plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<Rate>,
+    /// Samples that came before they were sent, by the clock. They are in no percentile.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub disordered: u64,
     /// The ratios to other rows, the most important first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ratios: Vec<Ratio>,
     /// Processor time of the measured services per real time, in percent of one core.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cpu_percent: Option<f64>,
+    /// The runs, whose histograms [`crate::saved`] writes; a report for people has none.
+    #[serde(skip)]
+    pub runs: Vec<Run>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes it so")]
+const fn is_zero(number: &u64) -> bool {
+    *number == 0
 }
 
 impl Row {
@@ -143,8 +262,13 @@ impl Row {
             mode,
             regime,
             times,
+            service: None,
+            spread: None,
+            rate: None,
+            disordered: 0,
             ratios: Vec::new(),
             cpu_percent: None,
+            runs: Vec::new(),
         }
     }
 
@@ -170,42 +294,83 @@ pub struct Report {
 }
 
 impl fmt::Display for Report {
-    /// A table of at most 100 columns; times in ns below 10 µs, in ms above 10 ms.
+    /// A table of at most 100 columns.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const HEAD: &str = "mode           n       p50       p99     p99.9  ratios p50 (p99)";
+        const HEAD: &str =
+            "mode           n     p50     p90     p99   p99.9  p99.99 p99.999     max";
         writeln!(formatter, "{}", self.machine)?;
         let group = |row: &Row| format!("{}, {}", row.what, row.regime);
         for rows in self.rows.chunk_by(|one, next| group(one) == group(next)) {
             writeln!(formatter, "\n{:<22} {HEAD}", group(&rows[0]))?;
-            rows.iter().try_for_each(|row| row.fmt_line(formatter))?;
+            rows.iter().try_for_each(|row| row.fmt_lines(formatter))?;
+        }
+        let few = self.rows.iter().any(|row| row.times.p99999_ns.is_none());
+        if few {
+            writeln!(formatter, "\n-  fewer than ten samples lie beyond it")?;
         }
         Ok(())
     }
 }
 
 impl Row {
-    fn fmt_line(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (label, mode, n) = (self.label(), self.mode, self.times.n);
-        write!(formatter, "  {label:<20} {mode:<8} {n:>7}")?;
-        for ns in [self.times.p50_ns, self.times.p99_ns, self.times.p999_ns] {
-            write!(formatter, " {:>9}", time(ns))?;
+    fn fmt_lines(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (label, mode) = (self.label(), self.mode.to_string());
+        line(formatter, &format!("  {label}"), &mode, &self.times)?;
+        if let Some(service) = self.service.filter(|service| shown(service) != shown(&self.times)) {
+            line(formatter, "    from its sending", "", &service)?;
         }
-        let ratios = self.ratios.iter().map(|ratio| {
-            let (p50, p99) = (times(ratio.p50), times(ratio.p99));
-            format!("{p50} ({p99}) {}", ratio.to)
-        });
-        let processor = self
-            .cpu_percent
-            .map(|percent| format!("{percent:.0} % of a core"));
-        // One remark in each line keeps the table within its width.
-        for (index, remark) in ratios.chain(processor).enumerate() {
-            if index > 0 {
-                write!(formatter, "\n{:69}", "")?;
-            }
-            write!(formatter, "  {remark}")?;
+        let mut say = |remark: String| writeln!(formatter, "    {remark}");
+        if let Some(spread) = self.spread {
+            let between = |[low, high]: [u64; 2]| format!("{} to {}", time(low), time(high));
+            let p99 = spread.p99_ns.map(between).map(|it| format!(", p99 {it}"));
+            let p50 = between(spread.p50_ns);
+            say(format!("runs: p50 {p50}{}", p99.unwrap_or_default()))?;
         }
-        writeln!(formatter)
+        for ratio in &self.ratios {
+            let p99 = ratio.p99.map(|p99| format!(" (p99 {})", times(p99)));
+            let (p50, p99) = (times(ratio.p50), p99.unwrap_or_default());
+            say(format!("{p50}{p99} times {}", ratio.to))?;
+        }
+        if let Some(percent) = self.cpu_percent {
+            say(format!("{percent:.0} % of a core"))?;
+        }
+        if let Some(rate) = self.rate.filter(Rate::overload) {
+            let (asked, reached) = (rate.asked_hz, rate.reached_hz);
+            say(format!(
+                "overload: {reached:.0} of {asked:.0} samples a second were sent, so these times \
+                 are those of a backlog"
+            ))?;
+        }
+        if self.disordered > 0 {
+            let many = self.disordered;
+            say(format!("clock disorder: {many} samples came before they were sent"))?;
+        }
+        Ok(())
     }
+}
+
+/// The cells of a line.
+fn shown(quantiles: &Quantiles) -> [String; 7] {
+    let cell = |ns: Option<u64>| ns.map_or_else(|| "-".to_owned(), time);
+    [
+        cell(quantiles.p50_ns),
+        cell(quantiles.p90_ns),
+        cell(quantiles.p99_ns),
+        cell(quantiles.p999_ns),
+        cell(quantiles.p9999_ns),
+        cell(quantiles.p99999_ns),
+        time(quantiles.max_ns),
+    ]
+}
+
+fn line(
+    formatter: &mut fmt::Formatter<'_>,
+    label: &str,
+    mode: &str,
+    quantiles: &Quantiles,
+) -> fmt::Result {
+    let cells = shown(quantiles).map(|cell| format!(" {cell:>7}")).concat();
+    writeln!(formatter, "{label:<22} {mode:<8}{:>8}{cells}", quantiles.n)
 }
 
 /// A ratio needs at most three digits.
@@ -217,11 +382,18 @@ fn times(ratio: f64) -> String {
     }
 }
 
-fn time(ns: u64) -> String {
-    match ns {
-        ..10_000 => format!("{ns} ns"),
-        10_000..10_000_000 => format!("{:.1} us", ns as f64 / 1e3),
-        _ => format!("{:.1} ms", ns as f64 / 1e6),
+/// A time in at most seven characters.
+pub(crate) fn time(ns: u64) -> String {
+    let (value, unit) = match ns {
+        ..1_000 => return format!("{ns} ns"),
+        1_000..1_000_000 => (ns as f64 / 1e3, "us"),
+        1_000_000..1_000_000_000 => (ns as f64 / 1e6, "ms"),
+        _ => (ns as f64 / 1e9, "s"),
+    };
+    match value {
+        small if small < 9.995 => format!("{small:.2} {unit}"),
+        medium if medium < 99.95 => format!("{medium:.1} {unit}"),
+        large => format!("{large:.0} {unit}"),
     }
 }
 
@@ -230,20 +402,26 @@ mod tests {
     use super::*;
 
     fn report() -> Report {
-        let ratio = |to: &str, p50| Ratio {
+        let ratio = |to: &str, p50, p99| Ratio {
             to: to.to_owned(),
             p50,
-            p99: 2.0 * p50,
-            runs: vec![[p50, 2.0 * p50]],
+            p99,
+            runs: vec![(p50, p99)],
         };
         let times = Quantiles {
             n: 50_000,
-            p50_ns: 9_999,
-            p99_ns: 10_000,
-            p999_ns: 1_234_567,
+            p50_ns: Some(9_999),
+            p90_ns: Some(10_000),
+            p99_ns: Some(10_100),
+            p999_ns: Some(1_234_567),
+            max_ns: 1_234_567_890,
+            ..Quantiles::default()
         };
         let mut row = Row::new("hop", "lager", Mode::Block, Regime::NoHalt, times);
-        row.ratios = vec![ratio("iceoryx2/event", 0.8), ratio("futex", 1.1)];
+        row.ratios = vec![
+            ratio("iceoryx2/event", 0.8, Some(1.6)),
+            ratio("futex", 1.1, None),
+        ];
         Report {
             machine: "a machine".to_owned(),
             rows: vec![row],
@@ -255,10 +433,11 @@ mod tests {
         let json = serde_json::to_value(report()).unwrap();
         let expected = serde_json::json!({
             "name": "lager", "what": "hop", "mode": "block", "regime": "no-halt", "n": 50_000,
-            "p50_ns": 9_999, "p99_ns": 10_000, "p999_ns": 1_234_567,
+            "p50_ns": 9_999, "p90_ns": 10_000, "p99_ns": 10_100, "p999_ns": 1_234_567,
+            "p9999_ns": null, "p99999_ns": null, "max_ns": 1_234_567_890,
             "ratios": [
                 {"to": "iceoryx2/event", "p50": 0.8, "p99": 1.6, "runs": [[0.8, 1.6]]},
-                {"to": "futex", "p50": 1.1, "p99": 2.2, "runs": [[1.1, 2.2]]},
+                {"to": "futex", "p50": 1.1, "p99": null, "runs": [[1.1, null]]},
             ],
         });
         assert_eq!(json["machine"], "a machine");
@@ -267,13 +446,38 @@ mod tests {
 
     #[test]
     fn the_table_fits_a_terminal_and_shows_every_ratio() {
-        let table = report().to_string();
-        assert!(
-            table.contains("9999 ns") && table.contains("1234.6 us"),
-            "{table}"
-        );
-        assert!(table.contains("0.80 (1.60) iceoryx2/event"), "{table}");
-        assert!(table.contains("1.10 (2.20) futex"), "{table}");
+        let mut report = report();
+        report.rows[0].service = Some(Quantiles {
+            max_ns: 5,
+            ..report.rows[0].times
+        });
+        report.rows[0].rate = Some(Rate {
+            asked_hz: 10_000.0,
+            reached_hz: 5_000.0,
+        });
+        report.rows[0].disordered = 1;
+        let table = report.to_string();
+        for cell in [
+            " 10.0 us 10.0 us 10.1 us 1.23 ms       -       -  1.23 s",
+            "0.80 (p99 1.60) times iceoryx2/event",
+            "1.10 times futex",
+            "from its sending",
+            "overload: 5000 of 10000",
+            "clock disorder: 1",
+            "-  fewer than ten samples",
+        ] {
+            assert!(table.contains(cell), "{cell}: {table}");
+        }
         assert!(table.lines().all(|line| line.chars().count() <= 100));
+    }
+
+    #[test]
+    fn a_time_takes_at_most_seven_characters() {
+        for ns in (0..19).flat_map(|power| [10_u64.pow(power), 10_u64.pow(power) * 9_994 / 1_000]) {
+            let wide = time(ns).chars().count();
+            assert!(wide <= 7 || ns >= 10_000_000_000_000, "{}", time(ns));
+        }
+        assert_eq!(time(999), "999 ns");
+        assert_eq!(time(99_960), "100 us");
     }
 }

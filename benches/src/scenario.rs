@@ -4,7 +4,7 @@ use clap::ValueEnum;
 
 use crate::error::BenchError;
 use crate::group::Group;
-use crate::machine;
+use crate::machine::Machine;
 use crate::report::{Options, Report, shown_by_name};
 use crate::{hop, path, publish};
 
@@ -59,7 +59,7 @@ impl Scenario {
             hop::beside_its_parts(&mut rows);
         }
         Ok(Report {
-            machine: machine::describe(),
+            machine: Machine::here().to_string(),
             rows,
         })
     }

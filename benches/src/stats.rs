@@ -1,52 +1,158 @@
-//! Quantiles of samples and medians over runs.
+//! The whole distribution of a row's times, what is read off it, and medians over runs.
+//!
+//! A [`Distribution`] is an HdrHistogram that grows with its values, so no time is too long for it,
+//! and the longest one is kept as it was. Distributions of several rounds add up; percentiles do
+//! not, so nothing here averages percentiles.
 
+use hdrhistogram::Histogram;
+use hdrhistogram::serialization::{Deserializer, Serializer as _, V2DeflateSerializer};
 use serde::{Deserialize, Serialize};
 
-/// The figures of one run of one row, or their medians over several runs; times in ns.
+/// A percentile is a figure only if this many samples lie beyond it.
+const BEYOND: u64 = 10;
+
+/// Times in ns. Each is kept with three digits; their number and the longest one are exact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distribution {
+    histogram: Histogram<u64>,
+    max_ns: u64,
+}
+
+impl Default for Distribution {
+    fn default() -> Self {
+        Self {
+            histogram: Histogram::new(3).expect("three digits are allowed"),
+            max_ns: 0,
+        }
+    }
+}
+
+impl Extend<u64> for Distribution {
+    fn extend<I: IntoIterator<Item = u64>>(&mut self, times_ns: I) {
+        for ns in times_ns {
+            self.histogram
+                .record(ns)
+                .expect("it grows up to every number");
+            self.max_ns = self.max_ns.max(ns);
+        }
+    }
+}
+
+impl FromIterator<u64> for Distribution {
+    fn from_iter<I: IntoIterator<Item = u64>>(times_ns: I) -> Self {
+        let mut distribution = Self::default();
+        distribution.extend(times_ns);
+        distribution
+    }
+}
+
+impl Distribution {
+    /// Adds the times of another one.
+    pub fn add(&mut self, other: &Self) {
+        self.histogram
+            .add(&other.histogram)
+            .expect("it grows up to every number");
+        self.max_ns = self.max_ns.max(other.max_ns);
+    }
+
+    /// The time that a share of the samples does not exceed, in ns. `None` if fewer than ten samples
+    /// lie beyond it: it would be little more than the longest time by another name.
+    #[must_use]
+    pub fn percentile(&self, percent: f64) -> Option<u64> {
+        let n = self.histogram.len();
+        let beyond = n as f64 * (1.0 - percent / 100.0);
+        // A share such as 0.1 is not exact in binary.
+        (beyond + 1e-6 >= BEYOND as f64)
+            .then(|| self.histogram.value_at_percentile(percent).min(self.max_ns))
+    }
+
+    /// The figures of a report.
+    #[must_use]
+    pub fn quantiles(&self) -> Quantiles {
+        Quantiles {
+            n: self.histogram.len(),
+            p50_ns: self.percentile(50.0),
+            p90_ns: self.percentile(90.0),
+            p99_ns: self.percentile(99.0),
+            p999_ns: self.percentile(99.9),
+            p9999_ns: self.percentile(99.99),
+            p99999_ns: self.percentile(99.999),
+            max_ns: self.max_ns,
+        }
+    }
+
+    /// The number of times of at least that many ns; one more or less where the digits end.
+    #[must_use]
+    pub fn at_least(&self, ns: u64) -> u64 {
+        self.histogram.count_between(ns, u64::MAX)
+    }
+
+    /// The histogram, for HdrHistogram's own formats.
+    pub(crate) const fn histogram(&self) -> &Histogram<u64> {
+        &self.histogram
+    }
+}
+
+/// In JSON: HdrHistogram's compressed format in base64, as in its logs, and the longest time.
+#[derive(Serialize, Deserialize)]
+struct Packed {
+    v2_deflate: String,
+    max_ns: u64,
+}
+
+impl Serialize for Distribution {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut bytes = Vec::new();
+        V2DeflateSerializer::new()
+            .serialize(&self.histogram, &mut bytes)
+            .map_err(serde::ser::Error::custom)?;
+        let packed = Packed {
+            v2_deflate: data_encoding::BASE64.encode(&bytes),
+            max_ns: self.max_ns,
+        };
+        packed.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Distribution {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        use serde::de::Error;
+        let packed = Packed::deserialize(deserializer)?;
+        let bytes = data_encoding::BASE64
+            .decode(packed.v2_deflate.as_bytes())
+            .map_err(D::Error::custom)?;
+        let mut read = Deserializer::new()
+            .deserialize(&mut &bytes[..])
+            .map_err(D::Error::custom)?;
+        // One that was read does not grow by itself.
+        read.auto(true);
+        Ok(Self {
+            histogram: read,
+            max_ns: packed.max_ns,
+        })
+    }
+}
+
+/// The figures of a row; times in ns. A percentile with fewer than ten samples beyond it is absent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Quantiles {
     /// The number of samples.
     pub n: u64,
     /// The median.
-    pub p50_ns: u64,
-    /// 99 % of the samples are at most this.
-    pub p99_ns: u64,
-    /// 99.9 % of the samples are at most this.
-    pub p999_ns: u64,
-}
-
-impl Quantiles {
-    /// The figures of `samples`, which this sorts; `None` if there are none.
-    pub(crate) fn of(samples: &mut [u64]) -> Option<Self> {
-        samples.sort_unstable();
-        Some(Self {
-            n: samples.len() as u64,
-            p50_ns: at(samples, 500)?,
-            p99_ns: at(samples, 990)?,
-            p999_ns: at(samples, 999)?,
-        })
-    }
-
-    /// Each figure's median over the runs, and the number of all samples; `None` without a run.
-    pub(crate) fn over(runs: &[Self]) -> Option<Self> {
-        let middle = |figure: fn(&Self) -> u64| {
-            let mut figures: Vec<u64> = runs.iter().map(figure).collect();
-            figures.sort_unstable();
-            at(&figures, 500)
-        };
-        Some(Self {
-            n: runs.iter().map(|run| run.n).sum(),
-            p50_ns: middle(|run| run.p50_ns)?,
-            p99_ns: middle(|run| run.p99_ns)?,
-            p999_ns: middle(|run| run.p999_ns)?,
-        })
-    }
-}
-
-/// The smallest sample that `permille` of all samples do not exceed (nearest rank).
-pub(crate) fn at(sorted: &[u64], permille: usize) -> Option<u64> {
-    let rank = (sorted.len() * permille).div_ceil(1000);
-    sorted.get(rank.saturating_sub(1)).copied()
+    pub p50_ns: Option<u64>,
+    /// 90 % of the samples are at most this, and so on.
+    pub p90_ns: Option<u64>,
+    /// 99 %.
+    pub p99_ns: Option<u64>,
+    /// 99.9 %.
+    pub p999_ns: Option<u64>,
+    /// 99.99 %.
+    pub p9999_ns: Option<u64>,
+    /// 99.999 %.
+    pub p99999_ns: Option<u64>,
+    /// The longest.
+    pub max_ns: u64,
 }
 
 /// The median; the mean of the middle two of an even number. `None` if there is no value.
@@ -63,38 +169,62 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_samples_by_nearest_rank() {
-        let mut samples: Vec<u64> = (1..=1000).rev().collect();
-        assert_eq!(
-            Quantiles::of(&mut samples),
-            Some(Quantiles {
-                n: 1000,
-                p50_ns: 500,
-                p99_ns: 990,
-                p999_ns: 999
-            })
-        );
+    fn a_percentile_is_a_sample_with_three_digits() {
+        let ascending: Distribution = (1..=1_000_000).collect();
+        let quantiles = ascending.quantiles();
+        let close = |ns: Option<u64>, to: u64| ns.unwrap().abs_diff(to) <= to / 1000;
+        assert!(close(quantiles.p50_ns, 500_000), "{quantiles:?}");
+        assert!(close(quantiles.p90_ns, 900_000), "{quantiles:?}");
+        assert!(close(quantiles.p99999_ns, 999_990), "{quantiles:?}");
+        assert_eq!((quantiles.n, quantiles.max_ns), (1_000_000, 1_000_000));
     }
 
     #[test]
-    fn few_samples_have_the_largest_as_their_tail() {
-        let quantiles = Quantiles::of(&mut [7, 5]).unwrap();
-        assert_eq!((quantiles.p50_ns, quantiles.p99_ns), (5, 7));
-        assert_eq!(Quantiles::of(&mut [3]).unwrap().p999_ns, 3);
-        assert_eq!(Quantiles::of(&mut []), None);
+    fn a_percentile_needs_ten_samples_beyond_it() {
+        let at = |n: u64| (0..n).map(|_| 7).collect::<Distribution>().quantiles();
+        for (n, percentile) in [
+            (20, (|found| found.p50_ns) as fn(Quantiles) -> Option<u64>),
+            (100, |found| found.p90_ns),
+            (1_000, |found| found.p99_ns),
+            (10_000, |found| found.p999_ns),
+            (100_000, |found| found.p9999_ns),
+            (1_000_000, |found| found.p99999_ns),
+        ] {
+            assert_eq!(percentile(at(n)), Some(7), "{n} samples");
+            assert_eq!(percentile(at(n - 1)), None, "{n} samples but one");
+        }
+        assert_eq!(at(3).max_ns, 7);
     }
 
     #[test]
-    fn one_bad_run_of_five_moves_no_figure() {
-        let run = |p50_ns| Quantiles {
-            n: 10,
-            p50_ns,
-            p99_ns: 2 * p50_ns,
-            p999_ns: 3 * p50_ns,
-        };
-        let over = Quantiles::over(&[run(100), run(9000), run(101), run(99), run(102)]);
-        assert_eq!(over, Some(Quantiles { n: 50, ..run(101) }));
-        assert_eq!(Quantiles::over(&[]), None);
+    fn rounds_add_up_to_what_one_long_round_would_have_been() {
+        let times = |from: u64| (from..20_000).step_by(2).map(|time| time * 37);
+        let (mut even, odd): (Distribution, Distribution) = (times(0).collect(), times(1).collect());
+        even.add(&odd);
+        assert_eq!(even, times(0).chain(times(1)).collect());
+    }
+
+    #[test]
+    fn no_time_is_too_long() {
+        let two_minutes = 120_000_000_001;
+        let mut some: Distribution = (0..2_000).collect();
+        some.extend([two_minutes, u64::MAX]);
+        assert_eq!(some.at_least(1_000_000_000), 2);
+        assert_eq!(some.quantiles().max_ns, u64::MAX);
+        assert!(some.quantiles().p99_ns.unwrap() < 2_000);
+    }
+
+    #[test]
+    fn what_was_saved_is_read_again_and_still_grows() {
+        let some: Distribution = (0..5_000).map(|time| time * time).collect();
+        let json = serde_json::to_string(&some).unwrap();
+        let mut again: Distribution = serde_json::from_str(&json).unwrap();
+        assert_eq!(again, some);
+        again.extend([u64::MAX / 2]);
+        assert_eq!(again.quantiles().n, 5_001);
+        for damaged in [json.replace("SIST", "SISU"), json.replace("HIST", "?!")] {
+            assert!(serde_json::from_str::<Distribution>(&damaged).is_err() || damaged == json);
+        }
     }
 
     #[test]

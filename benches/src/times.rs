@@ -5,31 +5,28 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::stats::at;
+use crate::stats::Distribution;
 
-/// A distribution, in milliseconds.
+/// A distribution, in milliseconds. A percentile with fewer than ten times beyond it is absent.
 #[derive(Debug, Serialize)]
 pub struct Times {
-    p50_ms: f64,
-    p95_ms: f64,
-    p99_ms: f64,
+    p50_ms: Option<f64>,
+    p95_ms: Option<f64>,
+    p99_ms: Option<f64>,
     max_ms: f64,
 }
 
 impl Times {
     /// The distribution of these times, in ns.
-    ///
-    /// # Panics
-    /// When there are none.
     #[must_use]
-    pub fn of(mut ns: Vec<u64>) -> Self {
-        ns.sort_unstable();
-        let at = |permille| at(&ns, permille).expect("some times") as f64 / 1e6;
+    pub fn of(ns: Vec<u64>) -> Self {
+        let times: Distribution = ns.into_iter().collect();
+        let at = |percent| times.percentile(percent).map(|ns| ns as f64 / 1e6);
         Self {
-            p50_ms: at(500),
-            p95_ms: at(950),
-            p99_ms: at(990),
-            max_ms: at(1000),
+            p50_ms: at(50.0),
+            p95_ms: at(95.0),
+            p99_ms: at(99.0),
+            max_ms: times.quantiles().max_ns as f64 / 1e6,
         }
     }
 }
@@ -45,8 +42,9 @@ pub fn table(
 ) -> fmt::Result {
     writeln!(formatter, "{head:26}     p50      p95      p99      max")?;
     for (name, times) in rows {
-        let cells = [times.p50_ms, times.p95_ms, times.p99_ms, times.max_ms];
-        let cells = cells.map(|ms| format!("{ms:7.1}")).join("  ");
+        let cells = [times.p50_ms, times.p95_ms, times.p99_ms, Some(times.max_ms)];
+        let cell = |ms: f64| format!("{ms:7.1}");
+        let cells = cells.map(|ms| ms.map_or_else(|| "      -".to_owned(), cell)).join("  ");
         writeln!(formatter, "{name:26} {cells}")?;
     }
     Ok(())

@@ -11,6 +11,7 @@ mod stop;
 
 use std::fmt;
 use std::io::Write as _;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -18,7 +19,9 @@ use clap::builder::PossibleValue;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use lager_benches::chip::{self, Programs};
-use lager_benches::{Mode, Options, Regime, Scenario as Timed, at_least_one};
+use lager_benches::compare::Comparison;
+use lager_benches::saved::Saved;
+use lager_benches::{Mode, Options, Regime, Report, Scenario as Timed, at_least_one};
 use serde::Serialize;
 
 /// The command line.
@@ -34,33 +37,79 @@ use serde::Serialize;
   lager bench fanout                               the writer's time for observers
   lager bench chip                                 the boards' images, in exact cycles
   lager bench stop                                 200 stops at full speed; --runs N for N
+  lager bench hop --out before                     saved, to compare it later
+  lager bench compare before.json after.json
 
-Times are medians over the runs: of each run's median (p50), and of the times that
-99 % and 99.9 % of its samples kept. A ratio compares with a baseline of the same
-run; you can compare ratios of two machines, but not times. Measure on an otherwise
-idle machine, with no robot up. The hop through Zenoh, which needs many crates, is
+A percentile is that of all runs together, and absent if fewer than ten samples lie
+beyond it. Where samples are due at a rate, a time counts from when its sample was
+due, so a stall hurts every sample that it delays. A ratio compares with a baseline
+of the same run, and is the median over the runs; you can compare ratios of two
+machines, but not times. Measure on an otherwise idle machine, with no robot up. The
+exit code is 2 if there is no result. The hop through Zenoh, which needs many crates, is
 measured beside the others only by
 `cargo run --release -p lager-benches --features zenoh --bin lager-bench -- hop`."
+,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
 )]
 struct BenchArgs {
+    #[command(subcommand)]
+    compare: Option<Action>,
     /// What to measure
-    scenario: Scenario,
+    #[arg(required = true)]
+    scenario: Option<Scenario>,
     /// Print one line of JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// How often to measure everything; every figure is the median over the runs (not `chip`)
+    /// How often to measure everything (not `chip`)
     /// [default: 5]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = at_least_one)]
     runs: Option<usize>,
     /// Take few samples, for a first look (not `chip`)
     #[arg(long)]
     quick: bool,
+    /// Samples of each round, of which a run has several (`hop`, `path`, `fanout`)
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = at_least_one)]
+    samples: Option<usize>,
+    /// Save everything in NAME.json, for `lager bench compare`, and the histograms also in
+    /// NAME.hlog, HdrHistogram's log format (`hop`, `path`, `fanout`)
+    #[arg(long, value_name = "NAME")]
+    out: Option<PathBuf>,
     /// How the receiver waits [default: all]
     #[arg(long, value_name = "MODE", value_delimiter = ',')]
     mode: Vec<Mode>,
     /// Where the processes run [default: all]
     #[arg(long, value_name = "REGIME", value_delimiter = ',')]
     regime: Vec<Regime>,
+}
+
+/// What `lager bench` does beside measuring.
+#[derive(Clone, Debug, clap::Subcommand)]
+enum Action {
+    /// Compare two saved measurements. Exit codes: 0 nothing is slower, 1 something is slower or
+    /// missing, 2 they cannot be compared
+    Compare {
+        /// The accepted measurement, which `--out` wrote
+        a: PathBuf,
+        /// The measurement to judge
+        b: PathBuf,
+        /// Slower is what takes longer by more than this, in percent
+        #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = percent)]
+        limit: f64,
+        /// Compare them even if they come from machines that differ
+        #[arg(long)]
+        across_machines: bool,
+        /// Print one line of JSON instead of a table
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// How much slower still counts as the same.
+fn percent(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|percent| (0.0..=1_000.0).contains(percent));
+    number.ok_or_else(|| "give a number from 0 to 1000".to_owned())
 }
 
 /// What `lager bench` can measure.
@@ -84,31 +133,75 @@ enum Scenario {
     Link,
 }
 
+/// There is no result, or two measurements cannot be compared.
+const NO_RESULT: u8 = 2;
+
 fn main() -> ExitCode {
     lager_benches::run_if_asked();
     let args = BenchArgs::parse();
+    if let Some(Action::Compare {
+        a,
+        b,
+        limit,
+        across_machines,
+        json,
+    }) = &args.compare
+    {
+        let limit = 1.0 + limit / 100.0;
+        return ended("compare", compare([a, b], limit, *across_machines, *json));
+    }
     if let Err(refused) = args.refuse_what_does_not_vary() {
         refused.exit();
     }
-    match run(&args) {
-        Ok(report) => {
+    let scenario = args.scenario().to_possible_value();
+    let name = scenario.as_ref().map_or("", PossibleValue::get_name);
+    ended(name, run(&args).map(|report| (report, ExitCode::SUCCESS)))
+}
+
+/// Prints what was found, or why there is nothing.
+fn ended(name: &str, result: Result<(String, ExitCode)>) -> ExitCode {
+    match result {
+        Ok((report, code)) => {
             // It is no error that the reader has gone, as after `| head`.
             let _ = writeln!(std::io::stdout(), "{report}");
-            ExitCode::SUCCESS
+            code
         }
         Err(error) => {
-            let scenario = args.scenario.to_possible_value();
-            let scenario = scenario.as_ref().map_or("", PossibleValue::get_name);
-            eprintln!("lager: `lager bench {scenario}` has no result: {error:#}");
-            ExitCode::FAILURE
+            eprintln!("lager: `lager bench {name}` has no result: {error:#}");
+            ExitCode::from(NO_RESULT)
         }
     }
 }
 
+/// Compares the second measurement with the first.
+fn compare(
+    [a, b]: [&PathBuf; 2],
+    limit: f64,
+    across: bool,
+    json: bool,
+) -> Result<(String, ExitCode)> {
+    let comparison = Comparison::of(&Saved::read(a)?, &Saved::read(b)?, limit, across)?;
+    let code = ExitCode::from(u8::from(comparison.fails()));
+    Ok((printed(json, &comparison)?, code))
+}
+
+/// A report as a line of JSON or as a table.
+fn printed<R: Serialize + fmt::Display>(json: bool, report: &R) -> Result<String> {
+    Ok(match json {
+        true => serde_json::to_string(report)?,
+        false => report.to_string().trim_end().to_owned(),
+    })
+}
+
 impl BenchArgs {
+    const fn scenario(&self) -> Scenario {
+        self.scenario.expect("clap demands it")
+    }
+
     fn refuse_what_does_not_vary(&self) -> Result<(), clap::Error> {
         let varies = !self.mode.is_empty() || !self.regime.is_empty();
-        let sentence = match self.scenario {
+        let varies = varies || self.samples.is_some() || self.out.is_some();
+        let sentence = match self.scenario() {
             Scenario::Hop | Scenario::Path | Scenario::Fanout => return Ok(()),
             Scenario::Chip if varies || self.quick || self.runs.is_some() => {
                 "`lager bench chip` counts cycles, and every run counts the same: it takes --json \
@@ -122,12 +215,18 @@ impl BenchArgs {
         Err(Self::command().error(ErrorKind::ArgumentConflict, sentence))
     }
 
-    /// A report as a line of JSON or as a table.
     fn printed<R: Serialize + fmt::Display>(&self, report: &R) -> Result<String> {
-        Ok(match self.json {
-            true => serde_json::to_string(report)?,
-            false => report.to_string().trim_end().to_owned(),
-        })
+        printed(self.json, report)
+    }
+
+    /// Measures, and saves the result if that is asked for.
+    fn timed(&self, scenario: Timed) -> Result<String> {
+        let report: Report = scenario.measure(&options(self))?;
+        if let Some(name) = &self.out {
+            let [json, hlog] = Saved::of(&report).write(name)?;
+            eprintln!("saved in {} and {}", json.display(), hlog.display());
+        }
+        self.printed(&report)
     }
 }
 
@@ -138,15 +237,15 @@ const CUTS: [usize; 2] = [10, 60];
 
 /// Measures, and returns the text to print.
 fn run(args: &BenchArgs) -> Result<String> {
-    let usual = match args.scenario {
+    let usual = match args.scenario() {
         Scenario::Link => CUTS,
         _ => TIMES,
     };
     let times = args.runs.unwrap_or(usual[usize::from(!args.quick)]);
-    match args.scenario {
-        Scenario::Hop => args.printed(&Timed::Hop.measure(&options(args))?),
-        Scenario::Path => args.printed(&Timed::Path.measure(&options(args))?),
-        Scenario::Fanout => args.printed(&Timed::Fanout.measure(&options(args))?),
+    match args.scenario() {
+        Scenario::Hop => args.timed(Timed::Hop),
+        Scenario::Path => args.timed(Timed::Path),
+        Scenario::Fanout => args.timed(Timed::Fanout),
         Scenario::Chip => args.printed(&chip::measure(programs()?)?),
         Scenario::Stop => args.printed(&stop::measure(times)?),
         Scenario::Command => args.printed(&command::measure(times)?),
@@ -182,6 +281,7 @@ fn options(args: &BenchArgs) -> Options {
     Options {
         runs: args.runs.unwrap_or(Options::default().runs),
         quick: args.quick,
+        samples: args.samples,
         modes: or_all(&args.mode),
         regimes: or_all(&args.regime),
     }
@@ -223,12 +323,28 @@ mod tests {
             &["--runs", "5"],
             &["--mode", "spin"],
             &["--regime", "plain"],
+            &["--samples", "9"],
+            &["--out", "x"],
         ] {
             let args = parsed(&[&["chip"], choice].concat()).expect("valid");
             let refused = args
                 .refuse_what_does_not_vary()
                 .expect_err("nothing to choose");
             assert!(refused.to_string().contains("--json"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn two_files_are_compared_and_nothing_is_measured_with_them() {
+        let two = parsed(&["compare", "a.json", "b.json", "--limit", "5"]).expect("valid");
+        assert!(matches!(two.compare, Some(Action::Compare { limit: 5.0, .. })), "{two:?}");
+        for wrong in [
+            &["compare", "a.json"][..],
+            &["compare", "a", "b", "--limit", "-1"],
+            &["hop", "compare", "a", "b"],
+            &[],
+        ] {
+            assert!(parsed(wrong).is_err(), "{wrong:?}");
         }
     }
 

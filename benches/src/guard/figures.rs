@@ -87,15 +87,26 @@ impl Figures {
         let mut figures = Self::from_source(source);
         for row in &report.rows {
             let label = row.label();
+            if row.rate.is_some_and(|rate| rate.overload()) {
+                // Its figures are absent, so its limits are not kept.
+                continue;
+            }
+            let own = row.service.unwrap_or(row.times);
             for ratio in &row.ratios {
-                let times = [("p50", row.times.p50_ns), ("p99", row.times.p99_ns)];
-                for (place, (quantile, own_ns)) in times.into_iter().enumerate() {
+                let runs = ratio.runs.iter();
+                let p50: Vec<f64> = runs.clone().map(|run| run.0).collect();
+                let p99: Vec<f64> = runs.filter_map(|run| run.1).collect();
+                for (quantile, own_ns, runs) in [("p50", own.p50_ns, p50), ("p99", own.p99_ns, p99)]
+                {
+                    let Some(own_ns) = own_ns.filter(|_| !runs.is_empty()) else {
+                        continue;
+                    };
                     let name = format!(
                         "{} {} {}: {label} / {} {quantile}",
                         row.what, row.mode, row.regime, ratio.to
                     );
                     figures.times_ns.insert(name.clone(), own_ns as f64);
-                    figures.add(name, ratio.runs.iter().map(|run| run[place]).collect())?;
+                    figures.add(name, runs)?;
                 }
             }
         }
@@ -266,6 +277,15 @@ mod tests {
         let get = |name| figures.get(name).unwrap();
         assert_eq!(get("hop block same-core: lager / futex p50"), 1.25);
         assert_eq!(get("hop block same-core: lager / iceoryx2/event p99"), 0.6);
+    }
+
+    #[test]
+    fn what_has_too_few_samples_or_too_slow_a_machine_is_no_figure() {
+        let few = of_report(&ROW.replace("1.5]", "null]").replace("0.6]", "null]")).unwrap();
+        assert!(few.runs.keys().all(|name| name.ends_with("p50")));
+        assert_eq!(few.runs.len(), 2);
+        let slow = ROW.replacen('{', r#"{"rate":{"asked_hz":1000.0,"reached_hz":980.0},"#, 1);
+        assert!(of_report(&slow).unwrap().runs.is_empty());
     }
 
     #[test]

@@ -18,7 +18,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use lager_benches::chip::{self, ChipReport, Programs};
-use lager_benches::{Scenario, at_least_one, machine, median};
+use lager_benches::machine::Machine;
+use lager_benches::{Scenario, at_least_one, median};
 use serde::Serialize;
 
 use crate::error::{GuardError, read};
@@ -138,7 +139,7 @@ impl Guard {
     fn judge(&self) -> Result<Findings, GuardError> {
         let limits = &self.limits;
         let mut findings = Findings {
-            machine: machine::describe(),
+            machine: Machine::here(),
             kept: true,
             limits: Vec::new(),
             notes: Vec::new(),
@@ -230,7 +231,7 @@ fn print(findings: &Findings) {
 
 /// Prints the machine, and the head of a table of figures.
 fn head<const N: usize>(columns: [&str; N], last: &str) {
-    println!("{}\n", machine::describe());
+    println!("{}\n", Machine::here());
     line("figure", columns.map(str::to_owned), last);
 }
 

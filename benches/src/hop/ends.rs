@@ -17,7 +17,8 @@ use crate::baseline::zenoh;
 use crate::baseline::{End, LIMIT, TIME_OUT, memory, stream};
 use crate::error::{BenchError, Fault, broken, no_bus};
 use crate::group::Entry;
-use crate::pair::{self, Side};
+use crate::pair::{self, Noted, Side};
+use crate::plan::Plan;
 use crate::report::Mode;
 use crate::sample::{Ping, Pong, RECEIVER, SENDER, Sample};
 use crate::slow;
@@ -37,8 +38,8 @@ const TCP: usize = 4;
 pub(super) struct Job {
     /// The number of the row in [`ROWS`].
     pub(super) row: usize,
-    /// `Some` = one way is timed, by the clock at both ends, with at least this time between
-    /// samples; zero is as fast as they come back. `None` = half of the round trip is timed by one
+    /// `Some` = one way is timed, by the clock at both ends, and a sample is due after each such
+    /// time; zero is as fast as they come back. `None` = half of the round trip is timed by one
     /// end's clock, as fast as samples come back; only half of a delay at one end shows.
     pub(super) gap: Option<Duration>,
 }
@@ -59,7 +60,7 @@ const fn sleeps(label: &'static str, against: &'static [&'static str]) -> Entry 
 }
 
 /// A function that exchanges the samples of a round.
-type Exchange = fn(&One) -> Result<Vec<u64>, BenchError>;
+type Exchange = fn(&One) -> Result<Noted, BenchError>;
 
 /// Every row, in the order of the tables: its label and its baselines, and the function that
 /// exchanges its samples.
@@ -131,7 +132,7 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
 /// One round in one of the two processes, with ends of its own. The sender returns the times of one
 /// way, in ns. If only one way is timed, it returns when it sent, and the receiver when it
 /// received.
-pub(super) fn round(side: &Side, round: &Round) -> Result<Vec<u64>, BenchError> {
+pub(super) fn round(side: &Side, round: &Round) -> Result<Noted, BenchError> {
     let (_, exchange) = ROWS[round.what.row];
     exchange(&One { side, round })
 }
@@ -160,7 +161,7 @@ impl One<'_> {
         self.own_first(["bench/bare-ping", "bench/bare-pong"])
     }
 
-    fn ours(&self, policy: Policy) -> Result<Vec<u64>, BenchError> {
+    fn ours(&self, policy: Policy) -> Result<Noted, BenchError> {
         if self.side.is_first {
             let bus = self.side.bus(SENDER)?;
             self.exchange(ours::<Ping, Pong>(&bus, policy)?)
@@ -170,33 +171,42 @@ impl One<'_> {
         }
     }
 
-    fn polling<H: Header>(&self, limits: Option<Qos>) -> Result<Vec<u64>, BenchError> {
+    fn polling<H: Header>(&self, limits: Option<Qos>) -> Result<Noted, BenchError> {
         let member = Member::join(&self.side.config, limits)?;
         self.exchange(iceoryx::polling::<H>(&member, self.names())?)
     }
 
-    fn socket(&self, line: usize) -> Result<Vec<u64>, BenchError> {
+    fn socket(&self, line: usize) -> Result<Noted, BenchError> {
         let [socket, _] = self.own_first(self.side.lines[line].each_ref());
         self.exchange(stream::end(socket, socket))
     }
 
     /// Exchanges the samples, and keeps this end until the other process has finished too.
-    fn exchange(&self, mut end: impl End) -> Result<Vec<u64>, BenchError> {
+    fn exchange(&self, mut end: impl End) -> Result<Noted, BenchError> {
         self.side.together(self.round, || match self.side.is_first {
             true => self.send_and_time(&mut end),
             false => self.send_back(&mut end),
         })
     }
 
-    fn send_and_time(&self, end: &mut impl End) -> Result<Vec<u64>, BenchError> {
+    fn send_and_time(&self, end: &mut impl End) -> Result<Noted, BenchError> {
         let round = self.round;
         let mut times = Vec::with_capacity(round.all().count());
-        let gap_ns = round.what.gap.unwrap_or_default().as_nanos() as u64;
-        let mut due = Clock::monotonic_ns();
+        let period = round.what.gap.filter(|gap| !gap.is_zero());
+        let period = period.map(|gap| gap.as_nanos() as u64);
+        let begin = |period| Plan::new(Clock::monotonic_ns() + period, period, 0);
+        let mut plan = period.map(begin);
+        let mut due = Vec::new();
         for number in round.all() {
-            if gap_ns > 0 {
-                due = (due + gap_ns).max(Clock::monotonic_ns());
-                while Clock::monotonic_ns() < due {}
+            if round.is_first_timed(number) {
+                // What the warm-up was late does not count.
+                plan = period.map(begin);
+                due.clear();
+            }
+            if let Some(plan) = &mut plan {
+                let next = plan.next();
+                due.push(next.due);
+                while Clock::monotonic_ns() < next.send {}
             }
             let sent = Clock::monotonic_ns();
             let sample = end
@@ -210,10 +220,13 @@ impl One<'_> {
                 Some(_) => sent,
             });
         }
-        Ok(times)
+        Ok(Noted {
+            times,
+            due: period.map(|period| (due, period)),
+        })
     }
 
-    fn send_back(&self, end: &mut impl End) -> Result<Vec<u64>, BenchError> {
+    fn send_back(&self, end: &mut impl End) -> Result<Noted, BenchError> {
         let round = self.round;
         let one_way = round.what.gap.is_some();
         let mut times = Vec::with_capacity(round.all().count());
@@ -226,7 +239,7 @@ impl One<'_> {
             end.send(&sample).map_err(failed)?;
             self.check(number, &sample)?;
         }
-        Ok(times)
+        Ok(times.into())
     }
 
     fn check(&self, expected: u64, sample: &Sample) -> Result<(), BenchError> {

@@ -26,7 +26,7 @@ use rustix::io::Errno;
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::processes::{ANSWER_WITHIN, Processes};
-use super::turn::{Chain, sleep_until_due};
+use super::turn::{Chain, sleep_until};
 use crate::baseline::memory::Lanes;
 use crate::baseline::stream::read_whole;
 use crate::error::{BenchError, Fault};
@@ -123,11 +123,11 @@ impl Chain for Floor {
         &mut self.processes
     }
 
-    fn frame(&mut self) -> Result<u64, BenchError> {
+    fn frame(&mut self, at: u64) -> Result<[u64; 2], BenchError> {
         self.sent += 1;
         let mut bytes = [0; PACKET_LENGTH];
         bytes[..8].copy_from_slice(&self.sent.to_le_bytes());
-        sleep_until_due();
+        sleep_until(at);
         let start = Clock::monotonic_ns();
         self.cables[0].write(&bytes)?;
         let give_up = start + ANSWER_WITHIN.as_nanos() as u64;
@@ -148,6 +148,6 @@ impl Chain for Floor {
                 fault: Fault::Wrong(got),
             });
         }
-        Ok(end - start)
+        Ok([start, end])
     }
 }

@@ -29,7 +29,7 @@ use lager_wire::{Callsign, Centimetres, Command, LineState, Payload, WheelComman
 
 use super::processes::{ANSWER_WITHIN, Processes};
 use super::services::{BRIDGE, LOGIC, OBSERVER, Setup};
-use super::turn::{Chain, sleep_until_due};
+use super::turn::{Chain, next_due, sleep_until};
 use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
 
@@ -43,10 +43,10 @@ const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
 
 /// The reaction to a frame.
 enum Reaction {
-    /// The expected command was read this many ns after the frame was written.
-    After(u64),
-    /// Another command was read instead, this many ns after the frame was written.
-    Overtaken(u64),
+    /// The expected command was read: when the frame was written, and when this was, in ns.
+    After([u64; 2]),
+    /// Another command was read instead; both times, too.
+    Overtaken([u64; 2]),
     /// No new command came in time.
     None,
 }
@@ -189,9 +189,9 @@ impl Robot {
         Ok(())
     }
 
-    /// Sends one frame when it is due, and waits at most `limit` for its answer.
-    fn exchange(&mut self, limit: Duration) -> Result<Reaction, BenchError> {
-        sleep_until_due();
+    /// Sends one frame at `at`, in ns, and waits at most `limit` for its answer.
+    fn exchange(&mut self, at: u64, limit: Duration) -> Result<Reaction, BenchError> {
+        sleep_until(at);
         self.drain_commands()?;
         self.frames += 1;
         let follows = self.last.0 == FOLLOW;
@@ -226,9 +226,9 @@ impl Robot {
             })?;
             if let Some(code) = new {
                 return Ok(if (code == FOLLOW) == follows {
-                    Reaction::Overtaken(end - start)
+                    Reaction::Overtaken([start, end])
                 } else {
-                    Reaction::After(end - start)
+                    Reaction::After([start, end])
                 });
             }
         }
@@ -259,7 +259,8 @@ impl Chain for Robot {
         while in_a_row < IN_A_ROW {
             self.check(start)?;
             self.play_boards()?;
-            in_a_row = match self.exchange(Duration::from_millis(20))? {
+            let due = next_due(Clock::monotonic_ns());
+            in_a_row = match self.exchange(due, Duration::from_millis(20))? {
                 Reaction::After(_) => in_a_row + 1,
                 Reaction::Overtaken(_) | Reaction::None => 0,
             };
@@ -267,14 +268,14 @@ impl Chain for Robot {
         Ok(())
     }
 
-    fn frame(&mut self) -> Result<u64, BenchError> {
-        let time = match self.exchange(ANSWER_WITHIN)? {
-            Reaction::After(time) => time,
-            Reaction::Overtaken(time) => {
+    fn frame(&mut self, at: u64) -> Result<[u64; 2], BenchError> {
+        let times = match self.exchange(at, ANSWER_WITHIN)? {
+            Reaction::After(times) => times,
+            Reaction::Overtaken(times) => {
                 if self.counts {
-                    self.overtaken.push(time);
+                    self.overtaken.push(times[1] - times[0]);
                 }
-                time
+                times
             }
             Reaction::None => return Err(self.processes.fault(self.name, self.frames)),
         };
@@ -282,7 +283,7 @@ impl Chain for Robot {
         if self.last.0 != FOLLOW {
             self.report()?;
         }
-        Ok(time)
+        Ok(times)
     }
 
     fn counts(&mut self, counts: bool) -> Result<(), BenchError> {

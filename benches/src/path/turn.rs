@@ -1,8 +1,9 @@
 //! One turn of a chain: its processes wake, answer frames and sleep again.
 //!
-//! Frames come at 1 kHz, always at the same phase of the millisecond and away from the kernel's
+//! Frames are due at 1 kHz, always at the same phase of the millisecond and away from the kernel's
 //! timer tick, which comes on whole milliseconds. A chain that happened to meet the tick would look
-//! slower than one that did not.
+//! slower than one that did not. A frame that is late follows half a millisecond after the answer to
+//! the one before it, because logic trusts a line frame for almost as long ([`super::services`]).
 
 use lager_home::Clock;
 use lager_rig::{interrupted, timespec};
@@ -10,9 +11,14 @@ use rustix::thread::{ClockId, clock_nanosleep_absolute};
 
 use super::processes::Processes;
 use crate::error::BenchError;
+use crate::group::Taken;
+use crate::plan::Plan;
 
 /// Time between frames, in ns.
 const PERIOD: u64 = 1_000_000;
+
+/// The least time from an answer to the next frame, in ns.
+const REST: u64 = PERIOD / 2;
 
 /// The time within each millisecond at which a frame is sent, in ns.
 const PHASE: u64 = 370_000;
@@ -28,8 +34,8 @@ pub(super) const TURN: usize = 250;
 pub(super) trait Chain {
     /// The chain's processes, which are stopped while other chains are measured.
     fn processes(&mut self) -> &mut Processes;
-    /// Sends one frame when it is due; returns the time until its answer was read, in ns.
-    fn frame(&mut self) -> Result<u64, BenchError>;
+    /// Sends one frame at `at`; returns when it was sent and when its answer was read, in ns.
+    fn frame(&mut self, at: u64) -> Result<[u64; 2], BenchError>;
     /// Waits until the chain answers again after a pause.
     fn begin(&mut self) -> Result<(), BenchError> {
         Ok(())
@@ -46,40 +52,45 @@ pub(super) trait Chain {
 }
 
 /// One turn of `chain`: wakes it, warms it up, sends `frames` frames that count, and stops it.
-/// Returns their times in ns.
-pub(super) fn turn(chain: &mut dyn Chain, frames: usize) -> Result<Vec<u64>, BenchError> {
+pub(super) fn turn(chain: &mut dyn Chain, frames: usize) -> Result<Taken, BenchError> {
     chain.processes().wake();
     chain.begin()?;
-    for _ in 0..WARM_UP {
-        chain.frame()?;
-    }
+    exchange(chain, WARM_UP)?;
     chain.counts(true)?;
     chain.processes().start_counting();
-    let mut times = Vec::with_capacity(frames);
+    let taken = exchange(chain, frames)?;
+    chain.counts(false)?;
+    chain.processes().rest();
+    Ok(Taken::paced(PERIOD, taken))
+}
+
+/// Sends that many frames by a plan of their own: when each was due, sent and answered.
+fn exchange(chain: &mut dyn Chain, frames: usize) -> Result<Vec<[u64; 3]>, BenchError> {
+    let mut plan = Plan::new(next_due(Clock::monotonic_ns()), PERIOD, REST);
+    let mut taken = Vec::with_capacity(frames);
     for _ in 0..frames {
         if interrupted() {
             return Err(BenchError::Interrupted);
         }
-        times.push(chain.frame()?);
+        let next = plan.next();
+        let [sent, answered] = chain.frame(next.send)?;
+        plan.answered(answered);
+        taken.push([next.due, sent, answered]);
     }
-    chain.counts(false)?;
-    chain.processes().rest();
-    Ok(times)
+    Ok(taken)
 }
 
-/// Sleeps until the next frame is due.
-pub(super) fn sleep_until_due() {
-    let due = next_due(Clock::monotonic_ns());
-    while clock_nanosleep_absolute(ClockId::Monotonic, &timespec(due)).is_err() {
+/// Sleeps until `at`, in ns.
+pub(super) fn sleep_until(at: u64) {
+    while clock_nanosleep_absolute(ClockId::Monotonic, &timespec(at)).is_err() {
         if interrupted() {
             return;
         }
     }
 }
 
-/// The first moment of the right phase that is at least a quarter of a period away, so that the
-/// thread always sleeps before it sends.
-fn next_due(now: u64) -> u64 {
+/// The first moment of the right phase that is at least a quarter of a period away.
+pub(super) fn next_due(now: u64) -> u64 {
     let earliest = now + PERIOD / 4;
     let due = earliest - earliest % PERIOD + PHASE;
     if due < earliest { due + PERIOD } else { due }

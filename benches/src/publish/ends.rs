@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::baseline::iceoryx::Member;
 use crate::baseline::{LIMIT, TIME_OUT};
 use crate::error::{BenchError, Fault, broken, no_bus};
-use crate::pair::{self, Side};
+use crate::pair::{self, Noted, Side};
 use crate::sample::{Block, Ping, RECEIVER, SENDER, Sample, drain};
 use crate::slow;
 
@@ -42,8 +42,8 @@ type Round = pair::Round<Job>;
 type Times = Result<Vec<u64>, BenchError>;
 
 /// One round in one of the two processes.
-pub(super) fn round(side: &Side, round: &Round) -> Times {
-    match round.what {
+pub(super) fn round(side: &Side, round: &Round) -> Result<Noted, BenchError> {
+    let times = match round.what {
         Job::Lager { words, readers } => match words {
             SMALL => lager::<SMALL>(side, round, readers),
             KIB_64 => lager::<KIB_64>(side, round, readers),
@@ -56,7 +56,8 @@ pub(super) fn round(side: &Side, round: &Round) -> Times {
         },
         Job::Ring => ring(side, round),
         Job::Notify { listeners } => notify(side, round, listeners),
-    }
+    };
+    times.map(Noted::from)
 }
 
 /// The topic of blocks of that size. Small ones have `sensor/line`'s depth. Large ones have depth
