@@ -367,7 +367,10 @@ mod tests {
         // Twice as long for each sample; and one stall, after which it has caught up.
         let slow = reached(&|number| 2 * due(number));
         let stumbled = reached(&|number| due(number) + if number == 500 { 900 } else { 0 });
-        assert!(slow.overload() && !stumbled.overload(), "{slow:?} {stumbled:?}");
+        assert!(
+            slow.overload() && !stumbled.overload(),
+            "{slow:?} {stumbled:?}"
+        );
         assert!((slow.reached_hz - 500_000.0).abs() < 1.0, "{slow:?}");
     }
 

@@ -54,7 +54,7 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
         ("hop", Mode::Spin, None, [5_000, 20_000]),
         ("hop", Mode::Block, None, [500, 2_500]),
         ("hop@full-rate", Mode::Adaptive, full_rate, [5_000, 20_000]),
-        ("hop@10kHz", Mode::Adaptive, paced, [500, 2_000]),
+        ("hop@10kHz", Mode::Adaptive, paced, [2_000; 2]),
     ]
     .into_iter()
     .filter(|(_, mode, ..)| options.modes.contains(mode))

@@ -29,6 +29,7 @@ mod robot;
 mod services;
 mod turn;
 
+use lager_rig::Refused;
 use lager_rig::schedule::{Bound, NoRealTime, Placement, RealTime};
 
 use crate::error::BenchError;
@@ -130,11 +131,15 @@ impl Chains {
             chain.processes().rest();
             chains.push(chain);
         }
+        // A real board's UART does not oversleep, so this thread wakes as exactly as it can. All
+        // that it starts would inherit that, as it does the core.
+        let exactly = std::num::NonZeroU64::MIN;
+        rustix::thread::set_current_timer_slack(Some(exactly))
+            .map_err(Refused::to_make("timers without slack"))?;
         Ok(Self {
             chains,
             regime,
             observed,
-            // The last field: all that a thread starts inherits the thread's core.
             _bound: Bound::to(first)?,
         })
     }

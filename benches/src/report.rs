@@ -301,7 +301,7 @@ impl fmt::Display for Report {
         writeln!(formatter, "{}", self.machine)?;
         let group = |row: &Row| format!("{}, {}", row.what, row.regime);
         for rows in self.rows.chunk_by(|one, next| group(one) == group(next)) {
-            writeln!(formatter, "\n{:<22} {HEAD}", group(&rows[0]))?;
+            writeln!(formatter, "\n{:<24} {HEAD}", group(&rows[0]))?;
             rows.iter().try_for_each(|row| row.fmt_lines(formatter))?;
         }
         let few = self.rows.iter().any(|row| row.times.p99999_ns.is_none());
@@ -316,7 +316,10 @@ impl Row {
     fn fmt_lines(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (label, mode) = (self.label(), self.mode.to_string());
         line(formatter, &format!("  {label}"), &mode, &self.times)?;
-        if let Some(service) = self.service.filter(|service| shown(service) != shown(&self.times)) {
+        if let Some(service) = self
+            .service
+            .filter(|service| shown(service) != shown(&self.times))
+        {
             line(formatter, "    from its sending", "", &service)?;
         }
         let mut say = |remark: String| writeln!(formatter, "    {remark}");
@@ -343,7 +346,9 @@ impl Row {
         }
         if self.disordered > 0 {
             let many = self.disordered;
-            say(format!("clock disorder: {many} samples came before they were sent"))?;
+            say(format!(
+                "clock disorder: {many} samples came before they were sent"
+            ))?;
         }
         Ok(())
     }
@@ -359,7 +364,7 @@ fn shown(quantiles: &Quantiles) -> [String; 7] {
         cell(quantiles.p999_ns),
         cell(quantiles.p9999_ns),
         cell(quantiles.p99999_ns),
-        time(quantiles.max_ns),
+        cell((quantiles.n > 0).then_some(quantiles.max_ns)),
     ]
 }
 
@@ -370,7 +375,7 @@ fn line(
     quantiles: &Quantiles,
 ) -> fmt::Result {
     let cells = shown(quantiles).map(|cell| format!(" {cell:>7}")).concat();
-    writeln!(formatter, "{label:<22} {mode:<8}{:>8}{cells}", quantiles.n)
+    writeln!(formatter, "{label:<24} {mode:<8}{:>8}{cells}", quantiles.n)
 }
 
 /// A ratio needs at most three digits.
@@ -473,9 +478,9 @@ mod tests {
 
     #[test]
     fn a_time_takes_at_most_seven_characters() {
-        for ns in (0..19).flat_map(|power| [10_u64.pow(power), 10_u64.pow(power) * 9_994 / 1_000]) {
+        for ns in (0..15).flat_map(|power| [10_u64.pow(power), 10_u64.pow(power) * 9_994 / 1_000]) {
             let wide = time(ns).chars().count();
-            assert!(wide <= 7 || ns >= 10_000_000_000_000, "{}", time(ns));
+            assert!(wide <= 7 || ns >= 10_u64.pow(13), "{}", time(ns));
         }
         assert_eq!(time(999), "999 ns");
         assert_eq!(time(99_960), "100 us");

@@ -28,7 +28,9 @@ pub enum SaveError {
     #[error("{0}: {1}; name a file that `lager bench … --out NAME` wrote")]
     Read(PathBuf, std::io::Error),
     /// It is no saved measurement.
-    #[error("{0}: this is no saved measurement ({1}); name a file that `lager bench … --out NAME` wrote")]
+    #[error(
+        "{0}: this is no saved measurement ({1}); name a file that `lager bench … --out NAME` wrote"
+    )]
     Wrong(PathBuf, String),
 }
 
@@ -103,8 +105,8 @@ impl Saved {
     /// See [`SaveError`].
     pub fn read(path: &Path) -> Result<Self, SaveError> {
         let wrong = |why: String| SaveError::Wrong(path.to_owned(), why);
-        let text = fs::read_to_string(path)
-            .map_err(|error| SaveError::Read(path.to_owned(), error))?;
+        let text =
+            fs::read_to_string(path).map_err(|error| SaveError::Read(path.to_owned(), error))?;
         let saved: Self = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         match saved.layout {
             LAYOUT => Ok(saved),
@@ -145,7 +147,9 @@ impl Saved {
 
 /// `name` with that ending, once.
 fn ending_in(name: &Path, ending: &str) -> PathBuf {
-    let known = name.extension().is_some_and(|end| end == "json" || end == "hlog");
+    let known = name
+        .extension()
+        .is_some_and(|end| end == "json" || end == "hlog");
     match known {
         true => name.with_extension(ending),
         false => {
@@ -199,7 +203,10 @@ mod tests {
         for (text, words) in [
             (&whole[..whole.len() / 2], "no saved measurement"),
             ("", "no saved measurement"),
-            (&whole.replace("\"layout\":1", "\"layout\":9"), "layout is 9"),
+            (
+                &whole.replace("\"layout\":1", "\"layout\":9"),
+                "layout is 9",
+            ),
         ] {
             fs::write(&cut, text).unwrap();
             let said = Saved::read(&cut).unwrap_err().to_string();

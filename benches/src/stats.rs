@@ -4,6 +4,8 @@
 //! and the longest one is kept as it was. Distributions of several rounds add up; percentiles do
 //! not, so nothing here averages percentiles.
 
+use core::fmt;
+
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::{Deserializer, Serializer as _, V2DeflateSerializer};
 use serde::{Deserialize, Serialize};
@@ -12,10 +14,16 @@ use serde::{Deserialize, Serialize};
 const BEYOND: u64 = 10;
 
 /// Times in ns. Each is kept with three digits; their number and the longest one are exact.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Distribution {
     histogram: Histogram<u64>,
     max_ns: u64,
+}
+
+impl fmt::Debug for Distribution {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.quantiles().fmt(formatter)
+    }
 }
 
 impl Default for Distribution {
@@ -199,7 +207,8 @@ mod tests {
     #[test]
     fn rounds_add_up_to_what_one_long_round_would_have_been() {
         let times = |from: u64| (from..20_000).step_by(2).map(|time| time * 37);
-        let (mut even, odd): (Distribution, Distribution) = (times(0).collect(), times(1).collect());
+        let (mut even, odd): (Distribution, Distribution) =
+            (times(0).collect(), times(1).collect());
         even.add(&odd);
         assert_eq!(even, times(0).chain(times(1)).collect());
     }

@@ -44,7 +44,9 @@ pub fn table(
     for (name, times) in rows {
         let cells = [times.p50_ms, times.p95_ms, times.p99_ms, Some(times.max_ms)];
         let cell = |ms: f64| format!("{ms:7.1}");
-        let cells = cells.map(|ms| ms.map_or_else(|| "      -".to_owned(), cell)).join("  ");
+        let cells = cells
+            .map(|ms| ms.map_or_else(|| "      -".to_owned(), cell))
+            .join("  ");
         writeln!(formatter, "{name:26} {cells}")?;
     }
     Ok(())

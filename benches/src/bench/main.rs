@@ -47,8 +47,7 @@ of the same run, and is the median over the runs; you can compare ratios of two
 machines, but not times. Measure on an otherwise idle machine, with no robot up. The
 exit code is 2 if there is no result. The hop through Zenoh, which needs many crates, is
 measured beside the others only by
-`cargo run --release -p lager-benches --features zenoh --bin lager-bench -- hop`."
-,
+`cargo run --release -p lager-benches --features zenoh --bin lager-bench -- hop`.",
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true
 )]
@@ -337,7 +336,10 @@ mod tests {
     #[test]
     fn two_files_are_compared_and_nothing_is_measured_with_them() {
         let two = parsed(&["compare", "a.json", "b.json", "--limit", "5"]).expect("valid");
-        assert!(matches!(two.compare, Some(Action::Compare { limit: 5.0, .. })), "{two:?}");
+        assert!(
+            matches!(two.compare, Some(Action::Compare { limit: 5.0, .. })),
+            "{two:?}"
+        );
         for wrong in [
             &["compare", "a.json"][..],
             &["compare", "a", "b", "--limit", "-1"],

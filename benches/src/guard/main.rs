@@ -139,7 +139,7 @@ impl Guard {
     fn judge(&self) -> Result<Findings, GuardError> {
         let limits = &self.limits;
         let mut findings = Findings {
-            machine: Machine::here(),
+            machine: Machine::here().to_string(),
             kept: true,
             limits: Vec::new(),
             notes: Vec::new(),
