@@ -40,6 +40,8 @@ fn options(modes: &[Mode], regime: Regime) -> Options {
         runs: 1,
         quick: true,
         samples: None,
+        cores: None,
+        pace: None,
         modes: modes.to_vec(),
         regimes: vec![regime],
     }

@@ -264,7 +264,7 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::Machine;
+    use crate::conditions::Machine;
     use crate::report::{Mode, Rate, Regime};
     use crate::stats::Distribution;
 

@@ -14,6 +14,12 @@ pub enum BenchError {
         "this measurement needs {0} processor cores and this process may use {1}; run it on a larger machine, or without `taskset`, or choose `--regime same-core`"
     )]
     TooFewCores(usize, usize),
+    /// A chosen core is not among those that this process may use.
+    #[error(
+        "core {0} is not among those that this process may use ({list}); choose two of them with --cores",
+        list = .1.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+    )]
+    NotUsable(usize, Vec<usize>),
     /// A process could not be bound to its core.
     #[error(transparent)]
     Affinity(#[from] Unbound),

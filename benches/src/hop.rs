@@ -13,14 +13,15 @@
 //! CLOCK_MONOTONIC): half of a round trip would hide half of a delay at one end.
 //!
 //! Rows called `hop` are half of the round trip, as fast as samples come back. `hop@full-rate` is
-//! one way at the same rate, `hop@10kHz` one way with a sample every 100 µs.
+//! one way at the same rate, `hop@10kHz` one way with a sample due every 100 µs. With `--rate`, every
+//! mode is measured one way at that rate.
 
 mod ends;
 
-use core::time::Duration;
 use std::error::Error;
 use std::os::fd::OwnedFd;
 
+use clap::ValueEnum as _;
 use lager_rig::process::Main;
 use lager_rig::{Parent, Refused};
 use rustix::event::{EventfdFlags, eventfd};
@@ -29,8 +30,9 @@ use rustix::pipe::pipe;
 use crate::baseline::stream;
 use crate::error::BenchError;
 use crate::group::{Entry, Group};
+use crate::machine::cores_for;
 use crate::pair;
-use crate::report::{Mode, Options, Ratio, Regime, Row};
+use crate::report::{Mode, Options, Pace, Ratio, Regime, Row};
 use ends::{HEADER, Job, ROWS};
 
 const SENDER: &str = "sender of the hop";
@@ -42,45 +44,63 @@ fn exchange(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     pair::measure(parent, ends::round)
 }
 
-/// The time from one sample to the next at 10 kHz.
-const PACE: Duration = Duration::from_micros(100);
-
 /// The groups of one regime: the rows of one mode, and their baselines.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    // For each group: the time from one sample to the next if one way is timed, and the number of
-    // samples that take a fraction of a second.
-    let [full_rate, paced] = [Duration::ZERO, PACE].map(Some);
-    [
-        ("hop", Mode::Spin, None, [5_000, 20_000]),
-        ("hop", Mode::Block, None, [500, 2_500]),
-        ("hop@full-rate", Mode::Adaptive, full_rate, [5_000, 20_000]),
-        ("hop@10kHz", Mode::Adaptive, paced, [2_000; 2]),
-    ]
-    .into_iter()
-    .filter(|(_, mode, ..)| options.modes.contains(mode))
-    // On a shared core, a process that looks without pause keeps the sender from sending.
-    .filter(|(_, mode, ..)| regime != Regime::SameCore || *mode == Mode::Block)
-    .map(|(what, mode, gap, samples)| {
-        let takes_part =
-            |entry: &Entry| entry.mode == mode || (mode == Mode::Adaptive && entry.label == HEADER);
-        let numbered = ROWS.iter().enumerate();
-        let rows: Vec<_> = numbered
-            .filter(|(_, (entry, _))| takes_part(entry))
-            .map(|(row, (entry, _))| (*entry, Job { row, gap }))
+    // For each group: the pace if one way is timed, and the number of samples that take a fraction
+    // of a second.
+    let mut groups = vec![
+        (Mode::Spin, None, [5_000, 20_000]),
+        (Mode::Block, None, [500, 2_500]),
+        (Mode::Adaptive, Some(Pace::Full), [5_000, 20_000]),
+        (Mode::Adaptive, Some(Pace::Hz(10e3)), [2_000; 2]),
+    ];
+    if let Some(pace) = options.pace {
+        let samples = match pace {
+            Pace::Full => [5_000, 20_000],
+            Pace::Hz(hz) => [(hz / 5.0).clamp(20.0, 5_000.0) as usize; 2],
+        };
+        groups = Mode::value_variants()
+            .iter()
+            .map(|mode| (*mode, Some(pace), samples))
             .collect();
-        Group {
-            what: what.to_owned(),
-            regime,
-            entries: rows.iter().map(|(entry, _)| *entry).collect(),
-            rounds: pair::ROUNDS,
-            samples,
-            open: Box::new(move || {
-                // Both processes inherit the lines when they start.
-                pair::open(regime, [SENDER, RECEIVER], &lines()?, rows.clone())
-            }),
-        }
-    })
-    .collect()
+    }
+    groups
+        .into_iter()
+        .filter(|(mode, ..)| options.modes.contains(mode))
+        // On a shared core, a process that looks without pause keeps the sender from sending.
+        .filter(|(mode, ..)| regime != Regime::SameCore || *mode == Mode::Block)
+        .map(|(mode, pace, samples)| {
+            let what = pace.map_or_else(|| "hop".to_owned(), |pace| format!("hop@{pace}"));
+            let (gap, cores) = (pace.map(Pace::gap), options.cores);
+            let takes_part = |entry: &Entry| {
+                entry.mode == mode || (mode == Mode::Adaptive && entry.label == HEADER)
+            };
+            let numbered = ROWS.iter().enumerate();
+            let rows: Vec<_> = numbered
+                .filter(|(_, (entry, _))| takes_part(entry))
+                .map(|(row, (entry, _))| (*entry, Job { row, gap }))
+                .collect();
+            Group {
+                what,
+                regime,
+                entries: rows.iter().map(|(entry, _)| *entry).collect(),
+                rounds: pair::ROUNDS,
+                samples,
+                open: Box::new(move || {
+                    // Both processes inherit the lines when they start.
+                    let cores = cores_for(regime, cores)?;
+                    let names = [SENDER, RECEIVER];
+                    pair::open(
+                        cores,
+                        gap.unwrap_or_default(),
+                        names,
+                        &lines()?,
+                        rows.clone(),
+                    )
+                }),
+            }
+        })
+        .collect()
 }
 
 /// The descriptors of the kernel's carriers, in the order of the constants in `ends`.

@@ -14,6 +14,7 @@
 mod baseline;
 pub mod chip;
 pub mod compare;
+pub mod conditions;
 pub mod error;
 mod group;
 mod hop;
@@ -35,7 +36,7 @@ pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session, Taken};
 pub use lager_rig::{Domain, heed_interrupts, interrupted};
 pub use path::may_have_real_time;
-pub use report::{Mode, Options, Rate, Ratio, Regime, Report, Row, Run};
+pub use report::{Mode, Options, Pace, Rate, Ratio, Regime, Report, Row, Run};
 pub use scenario::Scenario;
 pub use stats::{Distribution, Quantiles, median};
 

@@ -25,8 +25,7 @@ use crate::baseline::LIMIT;
 use crate::baseline::memory::Lanes;
 use crate::error::{BenchError, Fault, no_bus};
 use crate::group::{Entry, Opened, Session, Taken};
-use crate::machine;
-use crate::report::Regime;
+use crate::machine::Cores;
 
 /// Rounds of each row in a run: with `--quick`, and without.
 pub(crate) const ROUNDS: [usize; 2] = [2, 4];
@@ -126,17 +125,20 @@ struct Pair<X> {
     _memory: Shared<Memory>,
     _domain: Domain,
     rows: Vec<(Entry, X)>,
+    /// The time from one sample to the next that is due.
+    gap: Duration,
     rounds: u32,
 }
 
-/// Starts both processes, which inherit `lines`, to measure `rows`.
+/// Starts both processes on their cores, which inherit `lines`, to measure `rows`, whose samples are
+/// due `gap` apart.
 pub(crate) fn open<X: Serialize + 'static>(
-    regime: Regime,
+    cores: Cores,
+    gap: Duration,
     [first, second]: [&str; 2],
     lines: &[[OwnedFd; 2]],
     rows: Vec<(Entry, X)>,
 ) -> Opened {
-    let cores = machine::cores_for(regime)?;
     let domain = Domain::new(crate::FAMILY)?;
     let memory = Shared::<Memory>::new()?;
     let start = |name, is_first, core| {
@@ -157,6 +159,7 @@ pub(crate) fn open<X: Serialize + 'static>(
         _memory: memory,
         _domain: domain,
         rows,
+        gap,
         rounds: 0,
     }))
 }
@@ -178,7 +181,7 @@ impl<X: Serialize> Session for Pair<X> {
             contender: format!("{} {}", entry.label, entry.mode),
             what,
         };
-        let limit = Duration::from_secs(60) + SAMPLE * (round.warm_up + samples);
+        let limit = Duration::from_secs(60) + (SAMPLE + self.gap) * (round.warm_up + samples);
         self.first.tell(&round);
         self.second.tell(&round);
         let (sent, received): (Noted, Noted) =

@@ -34,7 +34,7 @@ use lager_rig::schedule::{Bound, NoRealTime, Placement, RealTime};
 
 use crate::error::BenchError;
 use crate::group::{Entry, Group, Session, Taken};
-use crate::machine::cores_for;
+use crate::machine::{Cores, cores_for};
 use crate::report::{Mode, Options, Regime, Row};
 use crate::stats::Distribution;
 use floor::Floor;
@@ -80,13 +80,21 @@ static OBSERVED: Rows = [
 /// The groups of one regime. No row spins: bridge and logic would use two cores, and the boards
 /// need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
+    let cores = options.cores;
     let group = |what: &str, rows: &'static [(Entry, usize)], observed: bool| Group {
         what: what.to_owned(),
         regime,
         entries: rows.iter().map(|(entry, _)| *entry).collect(),
         rounds: TURNS,
         samples: [TURN; 2],
-        open: Box::new(move || Ok(Box::new(Chains::start(regime, rows, observed)?))),
+        open: Box::new(move || {
+            Ok(Box::new(Chains::start(
+                cores_for(regime, cores)?,
+                regime,
+                rows,
+                observed,
+            )?))
+        }),
     };
     let wants = |mode| options.modes.contains(&mode);
     // On one core, an adaptive service would spin on the core that the others need.
@@ -111,8 +119,12 @@ struct Chains {
 
 impl Chains {
     /// Starts robots and the floor, or observed robots whose services and boards run in real time.
-    fn start(regime: Regime, rows: &[(Entry, usize)], observed: bool) -> Result<Self, BenchError> {
-        let (first, second) = cores_for(regime)?;
+    fn start(
+        (first, second): Cores,
+        regime: Regime,
+        rows: &[(Entry, usize)],
+        observed: bool,
+    ) -> Result<Self, BenchError> {
         let [ends, logic] = [first, second].map(|core| Placement {
             core: Some(core),
             priority: observed.then_some(SERVICES),

@@ -24,6 +24,7 @@
 
 mod ends;
 
+use core::time::Duration;
 use std::error::Error;
 
 use lager_rig::Parent;
@@ -32,6 +33,7 @@ use lager_sample::Topic;
 use lager_topics::SensorLine;
 
 use crate::group::{Entry, Group};
+use crate::machine::{Cores, cores_for};
 use crate::pair;
 use crate::report::{Mode, Options, Regime};
 use ends::{Job, KIB_64, MIB_1, SMALL};
@@ -63,7 +65,13 @@ pub(crate) fn fan_out(regime: Regime, options: &Options) -> Vec<Group> {
                 (ours, Job::Lager { words, readers }),
                 (bare, Job::Iceoryx2 { words, readers }),
             ];
-            group(format!("publish-{readers}{size}"), regime, rows, samples)
+            group(
+                format!("publish-{readers}{size}"),
+                regime,
+                options.cores,
+                rows,
+                samples,
+            )
         })
     };
     [1, 8, 64].into_iter().flat_map(sizes).collect()
@@ -83,16 +91,33 @@ pub(crate) fn ring(regime: Regime, options: &Options) -> Option<Group> {
         (entry("iceoryx2/notify-1", &[]), notify(1)),
     ];
     let wanted = options.modes.contains(&Mode::Block);
-    wanted.then(|| group("ring-64".to_owned(), regime, rows, [100, 500]))
+    wanted.then(|| {
+        group(
+            "ring-64".to_owned(),
+            regime,
+            options.cores,
+            rows,
+            [100, 500],
+        )
+    })
 }
 
-fn group(what: String, regime: Regime, rows: Vec<(Entry, Job)>, samples: [usize; 2]) -> Group {
+fn group(
+    what: String,
+    regime: Regime,
+    cores: Option<Cores>,
+    rows: Vec<(Entry, Job)>,
+    samples: [usize; 2],
+) -> Group {
     Group {
         what,
         regime,
         entries: rows.iter().map(|(entry, _)| *entry).collect(),
         rounds: pair::ROUNDS,
         samples,
-        open: Box::new(move || pair::open(regime, [WRITER, READERS], &[], rows.clone())),
+        open: Box::new(move || {
+            let cores = cores_for(regime, cores)?;
+            pair::open(cores, Duration::ZERO, [WRITER, READERS], &[], rows.clone())
+        }),
     }
 }

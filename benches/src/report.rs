@@ -4,12 +4,16 @@
 //! Nothing here measures or judges. The guard checks limits; a report does not.
 
 use core::fmt;
+use core::str::FromStr;
+use core::time::Duration;
 
 use clap::ValueEnum;
 use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
+use crate::conditions::Conditions;
 use crate::group::Taken;
+use crate::machine::Cores;
 use crate::stats::{Distribution, Quantiles, median};
 
 /// How the receiver waits.
@@ -62,8 +66,54 @@ impl Mode {
     }
 }
 
+/// How often samples are due.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// As fast as they come back.
+    Full,
+    /// So many times a second.
+    Hz(f64),
+}
+
+impl Pace {
+    /// The fastest and the slowest rate, in Hz.
+    const RANGE: core::ops::RangeInclusive<f64> = 0.1..=1e6;
+
+    /// The time from one sample to the next; zero is as fast as they come back.
+    pub(crate) fn gap(self) -> Duration {
+        match self {
+            Self::Full => Duration::ZERO,
+            Self::Hz(hz) => Duration::from_secs_f64(1.0 / hz),
+        }
+    }
+}
+
+impl fmt::Display for Pace {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Full => write!(formatter, "full-rate"),
+            Self::Hz(hz) if hz >= 1e3 => write!(formatter, "{}kHz", hz / 1e3),
+            Self::Hz(hz) => write!(formatter, "{hz}Hz"),
+        }
+    }
+}
+
+impl FromStr for Pace {
+    type Err = String;
+
+    /// `full`, or a rate in Hz.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let hz = text.parse().ok().filter(|hz| Self::RANGE.contains(hz));
+        match (text, hz) {
+            ("full", _) => Ok(Self::Full),
+            (_, Some(hz)) => Ok(Self::Hz(hz)),
+            _ => Err("give `full`, or samples a second from 0.1 to 1000000".to_owned()),
+        }
+    }
+}
+
 /// The options of a measurement: what to measure, and how often.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Runs, at least 1; the times of all runs add up, and a ratio is the median over them.
     pub runs: usize,
@@ -71,6 +121,10 @@ pub struct Options {
     pub quick: bool,
     /// Samples of each round, if not the scenario's own number.
     pub samples: Option<usize>,
+    /// The cores of the two processes, if not the first that this process may use.
+    pub cores: Option<Cores>,
+    /// How often a hop is due, if not as its groups have it.
+    pub pace: Option<Pace>,
     /// The modes to measure.
     pub modes: Vec<Mode>,
     /// The regimes to measure.
@@ -84,6 +138,8 @@ impl Default for Options {
             runs: 5,
             quick: false,
             samples: None,
+            cores: None,
+            pace: None,
             modes: Mode::value_variants().to_vec(),
             regimes: Regime::value_variants().to_vec(),
         }
@@ -289,6 +345,9 @@ impl Row {
 pub struct Report {
     /// The machine in one line.
     pub machine: String,
+    /// What it was set to, and what else it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conditions: Option<Conditions>,
     /// The figures.
     pub rows: Vec<Row>,
 }
@@ -299,6 +358,9 @@ impl fmt::Display for Report {
         const HEAD: &str =
             "mode           n     p50     p90     p99   p99.9  p99.99 p99.999     max";
         writeln!(formatter, "{}", self.machine)?;
+        if let Some(conditions) = &self.conditions {
+            writeln!(formatter, "{conditions}")?;
+        }
         let group = |row: &Row| format!("{}, {}", row.what, row.regime);
         for rows in self.rows.chunk_by(|one, next| group(one) == group(next)) {
             writeln!(formatter, "\n{:<24} {HEAD}", group(&rows[0]))?;
@@ -429,6 +491,7 @@ mod tests {
         ];
         Report {
             machine: "a machine".to_owned(),
+            conditions: None,
             rows: vec![row],
         }
     }
@@ -474,6 +537,25 @@ mod tests {
             assert!(table.contains(cell), "{cell}: {table}");
         }
         assert!(table.lines().all(|line| line.chars().count() <= 100));
+    }
+
+    #[test]
+    fn a_pace_is_read_as_it_is_named() {
+        for (text, name, gap_us) in [
+            ("full", "full-rate", 0),
+            ("10000", "10kHz", 100),
+            ("50", "50Hz", 20_000),
+            ("2.5e3", "2.5kHz", 400),
+        ] {
+            let pace: Pace = text.parse().unwrap();
+            assert_eq!(
+                (pace.to_string(), pace.gap().as_micros()),
+                (name.to_owned(), gap_us)
+            );
+        }
+        for wrong in ["", "0", "-1", "1e9", "nan", "fast"] {
+            assert!(wrong.parse::<Pace>().is_err(), "{wrong}");
+        }
     }
 
     #[test]

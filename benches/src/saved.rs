@@ -11,7 +11,7 @@ use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 use serde::{Deserialize, Serialize};
 
-use crate::machine::Machine;
+use crate::conditions::{Conditions, Machine};
 use crate::report::{Report, Row, Run};
 use crate::stats::Distribution;
 
@@ -44,6 +44,8 @@ pub struct Saved {
     pub unix_s: u64,
     /// Where it was measured.
     pub machine: Machine,
+    /// What that machine was set to, and what else it did.
+    pub conditions: Option<Conditions>,
     /// The rows.
     pub rows: Vec<SavedRow>,
 }
@@ -68,6 +70,7 @@ impl Saved {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             unix_s: now.unwrap_or_default().as_secs(),
             machine,
+            conditions: None,
             rows,
         }
     }
@@ -79,7 +82,10 @@ impl Saved {
             runs: row.runs.clone(),
             row: row.clone(),
         };
-        Self::new(Machine::here(), report.rows.iter().map(row).collect())
+        Self {
+            conditions: report.conditions.clone(),
+            ..Self::new(Machine::here(), report.rows.iter().map(row).collect())
+        }
     }
 
     /// Writes both files; returns their paths.
@@ -181,6 +187,7 @@ mod tests {
         row.runs = vec![run.clone(), run];
         Saved::of(&Report {
             machine: String::new(),
+            conditions: None,
             rows: vec![row],
         })
     }

@@ -2,9 +2,10 @@
 
 use clap::ValueEnum;
 
+use crate::conditions::{Machine, Observed};
 use crate::error::BenchError;
 use crate::group::Group;
-use crate::machine::Machine;
+use crate::machine;
 use crate::report::{Options, Report, shown_by_name};
 use crate::{hop, path, publish};
 
@@ -27,7 +28,8 @@ impl Scenario {
     pub fn groups(self, options: &Options) -> Vec<Group> {
         let of_regime = |regime: &_| match self {
             Self::Hop => {
-                let ring = publish::ring(*regime, options);
+                // It has no pace of its own.
+                let ring = publish::ring(*regime, options).filter(|_| options.pace.is_none());
                 hop::groups(*regime, options)
                     .into_iter()
                     .chain(ring)
@@ -44,6 +46,11 @@ impl Scenario {
     /// # Errors
     /// See [`BenchError`].
     pub fn measure(self, options: &Options) -> Result<Report, BenchError> {
+        let cores = options.regimes.first();
+        let cores = cores
+            .map(|regime| machine::cores_for(*regime, options.cores))
+            .transpose()?;
+        let observed = Observed::begin(cores);
         let mut rows = Vec::new();
         for group in self.groups(options) {
             rows.extend(group.measure(options)?);
@@ -60,6 +67,7 @@ impl Scenario {
         }
         Ok(Report {
             machine: Machine::here().to_string(),
+            conditions: Some(observed.end()),
             rows,
         })
     }

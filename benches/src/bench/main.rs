@@ -21,7 +21,7 @@ use clap::{CommandFactory, Parser, ValueEnum};
 use lager_benches::chip::{self, Programs};
 use lager_benches::compare::Comparison;
 use lager_benches::saved::Saved;
-use lager_benches::{Mode, Options, Regime, Report, Scenario as Timed, at_least_one};
+use lager_benches::{Mode, Options, Pace, Regime, Report, Scenario as Timed, at_least_one};
 use serde::Serialize;
 
 /// The command line.
@@ -70,6 +70,13 @@ struct BenchArgs {
     /// Samples of each round, of which a run has several (`hop`, `path`, `fanout`)
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = at_least_one)]
     samples: Option<usize>,
+    /// The cores of the two processes [default: the first two]
+    #[arg(long, value_name = "A,B", value_parser = two_cores)]
+    cores: Option<(usize, usize)>,
+    /// How often a sample is due: so many times a second, or `full`, as fast as they come back
+    /// (`hop`) [default: `full`, and 10000 with an adaptive receiver, too]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    rate: Option<Pace>,
     /// Save everything in NAME.json, for `lager bench compare`, and the histograms also in
     /// NAME.hlog, HdrHistogram's log format (`hop`, `path`, `fanout`)
     #[arg(long, value_name = "NAME")]
@@ -102,6 +109,13 @@ enum Action {
         #[arg(long)]
         json: bool,
     },
+}
+
+/// Two cores, with a comma between them.
+fn two_cores(text: &str) -> Result<(usize, usize), String> {
+    let two = text.split_once(',');
+    let two = two.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    two.ok_or_else(|| "give two cores, such as 0,1".to_owned())
 }
 
 /// How much slower still counts as the same.
@@ -200,7 +214,14 @@ impl BenchArgs {
     fn refuse_what_does_not_vary(&self) -> Result<(), clap::Error> {
         let varies = !self.mode.is_empty() || !self.regime.is_empty();
         let varies = varies || self.samples.is_some() || self.out.is_some();
+        let varies = varies || self.cores.is_some() || self.rate.is_some();
         let sentence = match self.scenario() {
+            Scenario::Path if self.rate.is_some() => {
+                "the path's frames come at 1 kHz, as its robot needs them; only `hop` takes --rate"
+            }
+            Scenario::Fanout if self.rate.is_some() => {
+                "a writer publishes when all readers are ready; only `hop` takes --rate"
+            }
             Scenario::Hop | Scenario::Path | Scenario::Fanout => return Ok(()),
             Scenario::Chip if varies || self.quick || self.runs.is_some() => {
                 "`lager bench chip` counts cycles, and every run counts the same: it takes --json \
@@ -281,6 +302,8 @@ fn options(args: &BenchArgs) -> Options {
         runs: args.runs.unwrap_or(Options::default().runs),
         quick: args.quick,
         samples: args.samples,
+        cores: args.cores,
+        pace: args.rate,
         modes: or_all(&args.mode),
         regimes: or_all(&args.regime),
     }
@@ -324,6 +347,8 @@ mod tests {
             &["--regime", "plain"],
             &["--samples", "9"],
             &["--out", "x"],
+            &["--cores", "0,1"],
+            &["--rate", "100"],
         ] {
             let args = parsed(&[&["chip"], choice].concat()).expect("valid");
             let refused = args
@@ -360,6 +385,8 @@ mod tests {
             (&["hop", "--mode", "busy"], "spin, adaptive, block"),
             (&["hop", "--regime", "calm"], "plain, same-core, no-halt"),
             (&["hop", "--runs", "0"], "1 or more"),
+            (&["hop", "--cores", "0"], "such as 0,1"),
+            (&["hop", "--rate", "0"], "samples a second"),
         ] {
             let said = parsed(flags).expect_err("wrong").to_string();
             assert!(said.contains(words), "{said}");

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use lager_benches::chip::{self, ChipReport, Programs};
-use lager_benches::machine::Machine;
+use lager_benches::conditions::Machine;
 use lager_benches::{Scenario, at_least_one, median};
 use serde::Serialize;
 
