@@ -61,7 +61,7 @@ fn commission(seed: u64) {
         done.then_some(())
     });
     let bus = joined(&domain);
-    let mut person = Person::new(&domain, &bus, &config, build.divider);
+    let mut person = Person::new(&domain, &bus, &config, &build);
     person.commission();
     drop((person, bus));
     robot.signal(Signal::INT);

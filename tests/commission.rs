@@ -64,7 +64,7 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
     let (domain, config) = unknown(built);
     let mut robot = up(&domain, &config);
     let bus = Bus::open(&domain.bus("r1", 1.0), Role::Operator).expect("the bus opens");
-    let mut person = Person::new(&domain, &bus, &config, false);
+    let mut person = Person::new(&domain, &bus, &config, &build);
     person.commission();
     drop((person, bus));
     robot.signal(Signal::INT);
@@ -105,7 +105,7 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
 fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
     use lager_topics::LinkHealth;
 
-    let (built, _) = other();
+    let (built, build) = other();
     let (domain, config) = unknown(built);
     let mut robot = up(&domain, &config);
     let bus = Bus::open(&domain.bus("r1", 1.0), Role::Operator).expect("the bus opens");
@@ -128,7 +128,7 @@ fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
         &|person| person.typing = closed(),
     ];
     for end in ends {
-        let mut person = Person::new(&domain, &bus, &config, false);
+        let mut person = Person::new(&domain, &bus, &config, &build);
         loop {
             match person.asked() {
                 Question::RangeFar => break,

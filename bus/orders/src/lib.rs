@@ -1,6 +1,7 @@
 //! The orders of an operator to a robot, how long each holds, and the sentences about them.
 //!
 //! - [`Action`]: what an operator can ask.
+//! - [`Buttons`]: how a robot's own buttons are connected.
 //! - [`Commission`]: what a person says to a commissioning.
 //! - [`EventKind`]: what happens on a mission.
 //! - [`lease`]: how long an order holds, and how late one may come.
@@ -19,6 +20,7 @@
 extern crate alloc;
 
 mod action;
+mod button;
 mod commission;
 mod event;
 mod late;
@@ -29,6 +31,7 @@ mod reason;
 mod sentence;
 
 pub use action::{Action, LeaseMs, Put, Wheels};
+pub use button::{Buttons, Contact, Level, Levels, SwitchKind, lines};
 pub use commission::{AnswerWord, Commission};
 pub use event::EventKind;
 pub use late::Late;

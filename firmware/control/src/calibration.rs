@@ -3,6 +3,7 @@
 //!
 //! ```text
 //!   idle -- start --> watching -- time is up --> thresholds, idle
+//!                        '------- taken back --> idle
 //! ```
 //!
 //! A channel keeps its threshold if it saw too little contrast.
@@ -31,6 +32,8 @@ struct Extremes {
 pub(crate) struct Calibration {
     thresholds: [u8; CHANNELS],
     watch: Option<Extremes>,
+    /// Number of the setting that has taken something back.
+    taken_back: Option<u8>,
 }
 
 /// A calibration that has ended.
@@ -47,6 +50,7 @@ impl Calibration {
         Self {
             thresholds,
             watch: None,
+            taken_back: None,
         }
     }
 
@@ -62,6 +66,18 @@ impl Calibration {
             lowest: [u8::MAX; CHANNELS],
             highest: [u8::MIN; CHANNELS],
         });
+    }
+
+    /// Takes back the calibration that runs. Returns whether the last one that has ended is to be
+    /// taken back, because none runs. The same number again changes nothing.
+    pub(crate) fn take_back(&mut self, seq: u8) -> bool {
+        let is_news = self.taken_back.replace(seq) != Some(seq);
+        is_news && self.watch.take().is_none()
+    }
+
+    /// Puts other thresholds in force.
+    pub(crate) fn put(&mut self, thresholds: [u8; CHANNELS]) {
+        self.thresholds = thresholds;
     }
 
     /// The thresholds in force.

@@ -212,6 +212,13 @@ impl SensorUnit {
                     .start(setting.seq, self.config.calibration_us, now_us);
                 (1, SettingStatus::Accepted)
             }
+            (SettingKey::Calibrate, 2) => {
+                if self.calibration.take_back(setting.seq) {
+                    let before = self.store.restore(self.config.thresholds);
+                    self.calibration.put(before);
+                }
+                (2, SettingStatus::Accepted)
+            }
             (SettingKey::Calibrate, _) => (
                 i16::from(self.calibration.is_running()),
                 SettingStatus::OutOfRange,

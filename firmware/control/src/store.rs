@@ -11,6 +11,9 @@
 //! wins. A save clears the layout byte first and writes it last, so that a save that is cut off
 //! leaves the other copy valid. The chip needs some milliseconds for a byte: every step hands over
 //! at most one, and nothing waits. A board has two stores, each with a [`Place`] of its own.
+//!
+//! What was in force before the last save can be had back. Then both copies hold it, so that having
+//! it back twice changes nothing.
 
 use lager_wire::checksum;
 
@@ -51,6 +54,10 @@ struct Save {
 pub(crate) struct Store<const N: usize> {
     /// The settings in force in EEPROM, or in force when the save is done.
     kept: Option<[u8; N]>,
+    /// What was in force before that.
+    before: Option<[u8; N]>,
+    /// The same settings are saved once more when the save is done.
+    twice: bool,
     counter: u8,
     place: Place,
     /// The address that the next save writes to.
@@ -70,10 +77,15 @@ impl<const N: usize> Store<N> {
             (None, Some(_)) => true,
             (_, None) => false,
         };
-        let newest = if second_wins { second } else { first };
+        let (newest, older) = match second_wins {
+            true => (second, first),
+            false => (first, second),
+        };
         let kept = newest.map(|(_, settings)| settings);
         let store = Self {
             kept,
+            before: older.map(|(_, settings)| settings),
+            twice: false,
             counter: newest.map_or(0, |(counter, _)| counter),
             place,
             slot: if second_wins || newest.is_none() {
@@ -91,6 +103,29 @@ impl<const N: usize> Store<N> {
         if self.kept == Some(settings) {
             return;
         }
+        if self.save.is_none() {
+            self.before = self.kept;
+        }
+        self.twice = false;
+        self.begin(settings);
+    }
+
+    /// Begins to save what was in force before the last save, and returns it; `usual` is what was in
+    /// force before the first one.
+    pub(crate) fn restore(&mut self, usual: [u8; N]) -> [u8; N] {
+        let Some(kept) = self.kept else {
+            return usual;
+        };
+        let before = self.before.unwrap_or(usual);
+        self.before = Some(before);
+        if before != kept {
+            self.twice = true;
+            self.begin(before);
+        }
+        before
+    }
+
+    fn begin(&mut self, settings: [u8; N]) {
         if self.save.is_none() {
             self.counter = self.counter.wrapping_add(1);
         }
@@ -119,6 +154,11 @@ impl<const N: usize> Store<N> {
         if save.next > last {
             self.slot = 2 * self.place as u8 + SECOND - self.slot;
             self.save = None;
+            if core::mem::take(&mut self.twice)
+                && let Some(kept) = self.kept
+            {
+                self.begin(kept);
+            }
         }
     }
 
@@ -289,6 +329,44 @@ mod tests {
         store.save([1, 2, 3]);
         assert!(!store.is_saving());
         assert_eq!(chip.writes, 7);
+    }
+
+    #[test]
+    fn what_was_before_a_save_comes_back_and_stays_however_often_it_is_asked_for() {
+        const USUAL: [u8; 3] = [9, 9, 9];
+        for (saves, before) in [
+            (&[[1, 2, 3]][..], USUAL),
+            (&[[1, 2, 3], [4, 5, 6]], [1, 2, 3]),
+            (&[[1, 2, 3], [4, 5, 6], [7, 8, 9]], [4, 5, 6]),
+        ] {
+            // Also while the last save is under way, and when the board has restarted since.
+            for (is_whole, restarts) in [(true, false), (false, false), (true, true)] {
+                let mut chip = Chip::erased();
+                let (mut store, _) = Store::load(&chip, Place::Settings);
+                for (number, settings) in saves.iter().enumerate() {
+                    store.save(*settings);
+                    if is_whole || number + 1 < saves.len() {
+                        finish(&mut store, &mut chip);
+                    } else {
+                        store.poll(&mut chip);
+                    }
+                }
+                if restarts {
+                    store = Store::load(&chip, Place::Settings).0;
+                }
+                for _ in 0..3 {
+                    assert_eq!(store.restore(USUAL), before);
+                    store.poll(&mut chip);
+                    assert_eq!(store.restore(USUAL), before);
+                    finish(&mut store, &mut chip);
+                    assert_eq!(loaded(&chip), Some(before), "{saves:?}");
+                    store = Store::load(&chip, Place::Settings).0;
+                }
+            }
+        }
+        let (mut store, _) = Store::load(&Chip::erased(), Place::Settings);
+        assert_eq!(store.restore(USUAL), USUAL);
+        assert!(!store.is_saving(), "nothing was ever saved");
     }
 
     #[test]

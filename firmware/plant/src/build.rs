@@ -13,11 +13,14 @@
 //! | shoulder, elbow | two servos that face each other | one servo |
 //! | horns | the middle of a servo is the joint's as drawn | up to 60 units of position beside it |
 //! | ends of the joints | those of the servos | nearer |
+//! | buttons | none | reset at a line, a switch or button for the mode at another, or neither |
+//! | their contacts | | each pulls its line low or high, against a resistor or an open line |
 //! | claw's servo | pushes with all its torque 32 units before its goal | 24 to 48 |
 //!
 //! A robot of another build drives only when its boards have been told of it.
 
 use lager_ax12::table::MAX_POSITION;
+use lager_orders::{Contact, Level, Levels, SwitchKind};
 
 use crate::arm::SERVOS;
 use crate::noise::Noise;
@@ -85,6 +88,75 @@ impl Default for ArmBuild {
     }
 }
 
+/// A contact that a person closes, at a line of the Pi.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ContactBuild {
+    /// The line, and where the closed contact pulls it.
+    pub contact: Contact,
+    /// A resistor pulls the line the other way while the contact is open.
+    pub has_resistor: bool,
+}
+
+impl ContactBuild {
+    /// What its line shows.
+    fn level(&self, is_closed: bool) -> Option<Level> {
+        match is_closed {
+            true => Some(self.contact.closed),
+            false => self.has_resistor.then_some(self.contact.closed.other()),
+        }
+    }
+}
+
+/// The robot's own buttons.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ButtonsBuild {
+    /// The reset button.
+    pub reset: Option<ContactBuild>,
+    /// The mode switch or mode button.
+    pub mode: Option<(ContactBuild, SwitchKind)>,
+}
+
+impl ButtonsBuild {
+    /// The lines of the Pi's header that carry nothing else, from which buttons are drawn.
+    const LINES: [u8; 15] = [4, 5, 6, 12, 13, 16, 17, 18, 19, 20, 21, 22, 23, 24, 27];
+
+    /// What the Pi's lines show while these contacts, reset and mode, are closed.
+    pub fn levels(&self, closed: [bool; 2]) -> Levels {
+        let mode = self.mode.map(|(mode, _)| mode);
+        let mut levels = Levels::default();
+        for (button, is_closed) in [self.reset, mode].into_iter().zip(closed) {
+            if let Some(button) = button {
+                levels.set(button.contact.line, button.level(is_closed));
+            }
+        }
+        levels
+    }
+
+    fn drawn(noise: &mut Noise) -> Self {
+        let bits = noise.bits();
+        let bit = |index: u32| bits >> index & 1 != 0;
+        let level = |index| if bit(index) { Level::High } else { Level::Low };
+        let first = (bits >> 32) as usize % Self::LINES.len();
+        let step = 1 + (bits >> 48) as usize % (Self::LINES.len() - 1);
+        let button = |place: usize, index: u32| ContactBuild {
+            contact: Contact {
+                line: Self::LINES[place % Self::LINES.len()],
+                closed: level(index),
+            },
+            has_resistor: bit(index + 1),
+        };
+        let kind = match bit(4) {
+            true => SwitchKind::Press,
+            false => SwitchKind::Position,
+        };
+        // A robot in four has no reset button, and another one in four no mode switch.
+        Self {
+            reset: (bits >> 8 & 3 != 0).then(|| button(first, 0)),
+            mode: (bits >> 10 & 3 != 0).then(|| (button(first + step, 2), kind)),
+        }
+    }
+}
+
 /// How a robot is built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
@@ -102,6 +174,8 @@ pub struct Build {
     pub divider: bool,
     /// The arm's servos.
     pub arm: ArmBuild,
+    /// The robot's own buttons, at lines of the Pi.
+    pub buttons: ButtonsBuild,
 }
 
 impl Default for Build {
@@ -114,6 +188,7 @@ impl Default for Build {
             ranger: Ranger::default(),
             divider: true,
             arm: ArmBuild::default(),
+            buttons: ButtonsBuild::default(),
         }
     }
 }
@@ -122,6 +197,7 @@ impl Build {
     /// Another robot, the same for the same seed.
     pub fn drawn(seed: u64) -> Self {
         const STREAM: u64 = 101;
+        const BUTTONS: u64 = 102;
         let mut noise = Noise::new(seed, STREAM);
         let bits = noise.bits();
         let bit = |index: u32| bits >> index & 1 != 0;
@@ -139,6 +215,7 @@ impl Build {
             },
             divider: bit(4),
             arm: ArmBuild::drawn(&mut noise),
+            buttons: ButtonsBuild::drawn(&mut Noise::new(seed, BUTTONS)),
         }
     }
 
@@ -206,6 +283,38 @@ impl ArmBuild {
 mod tests {
     use super::*;
 
+    fn reset(build: &Build) -> Option<ContactBuild> {
+        build.buttons.reset
+    }
+
+    fn mode(build: &Build) -> Option<(ContactBuild, SwitchKind)> {
+        build.buttons.mode
+    }
+
+    #[test]
+    fn a_closed_contact_drives_its_line_and_an_open_one_leaves_it_to_its_resistor() {
+        let contact = |line, closed| Contact { line, closed };
+        let buttons = ButtonsBuild {
+            reset: Some(ContactBuild {
+                contact: contact(17, Level::Low),
+                has_resistor: false,
+            }),
+            mode: Some((
+                ContactBuild {
+                    contact: contact(27, Level::High),
+                    has_resistor: true,
+                },
+                SwitchKind::Press,
+            )),
+        };
+        let of = |closed| [17, 27, 5].map(|line| buttons.levels(closed).of(line));
+        assert_eq!(of([false, false]), [None, Some(Level::Low), None]);
+        assert_eq!(
+            of([true, true]),
+            [Some(Level::Low), Some(Level::High), None]
+        );
+    }
+
     #[test]
     fn a_seed_repeats_and_every_difference_occurs() {
         let builds: Vec<_> = (0..100).map(Build::drawn).collect();
@@ -231,11 +340,21 @@ mod tests {
             |build| build.arm.offsets[1] > 0,
             |build| build.arm.offsets[7] > 0,
             |build| build.arm.slope > SLOPES[0].midpoint(SLOPES[1]),
+            |build| reset(build).is_some_and(|reset| reset.contact.closed == Level::Low),
+            |build| reset(build).is_some_and(|reset| reset.has_resistor),
+            |build| mode(build).is_some_and(|(mode, _)| mode.contact.closed == Level::High),
+            |build| mode(build).is_some_and(|(_, kind)| kind == SwitchKind::Press),
+            |build| mode(build).is_some_and(|(_, kind)| kind == SwitchKind::Position),
         ] {
             let count = builds.iter().filter(|build| differs(build)).count();
             assert!((30..70).contains(&count), "{count}");
         }
         for build in builds {
+            let lines = [
+                reset(&build).map(|reset| reset.contact.line),
+                mode(&build).map(|(mode, _)| mode.contact.line),
+            ];
+            assert!(lines == [None; 2] || lines[0] != lines[1], "{build:?}");
             assert!((10.0..=14.0).contains(&build.full_turn()), "{build:?}");
             let mut ids: Vec<_> = build.arm.ids.into_iter().flatten().collect();
             ids.sort_unstable();

@@ -25,6 +25,8 @@ pub enum Hand {
     Bring(u8, u16),
     /// Holds a piece of goods between the jaws, or takes it away.
     Fill(bool),
+    /// Closes or opens the contact of reset (0) or mode (1).
+    Press(u8, bool),
     /// Puts a thing on this edge.
     Put(Edge),
     /// Takes the thing on this edge away.
@@ -65,6 +67,10 @@ impl Hand {
             }
             Self::Fill(is_there) => {
                 world.fill_claw(is_there);
+                Ok(())
+            }
+            Self::Press(button, is_closed) => {
+                world.press(button.into(), is_closed);
                 Ok(())
             }
             Self::Put(edge) => world.put_obstacle(edge),

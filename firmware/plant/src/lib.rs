@@ -42,7 +42,7 @@ pub mod weave;
 mod world;
 
 pub use body::Pose;
-pub use build::{ArmBuild, Build, Ranger};
+pub use build::{ArmBuild, Build, ButtonsBuild, ContactBuild, Ranger};
 pub use by_hand::{Hand, Report};
 pub use goods::{Good, GoodState};
 pub use make::Make;

@@ -7,6 +7,7 @@
 use core::time::Duration;
 
 use lager_floor::Edge;
+use lager_orders::Levels;
 use serde::{Deserialize, Serialize};
 
 use crate::arm::{self, SERVOS};
@@ -66,6 +67,10 @@ pub struct WorldState {
     pub collisions: u32,
     /// The things on edges.
     pub obstacles: Vec<Standing>,
+    /// Whether the contacts of reset and mode are closed.
+    pub closed: [bool; 2],
+    /// What the Pi's lines for buttons show.
+    pub levels: Levels,
 }
 
 /// The true state of the robot, which its own boards do not know.
@@ -87,6 +92,8 @@ pub struct World {
     lifted: bool,
     /// A person holds goods between the jaws.
     is_filled: bool,
+    /// Whether a person has closed the contacts of reset and mode.
+    closed: [bool; 2],
     /// What an input shows that hangs at nothing.
     floating: Noise,
     tape: Tape,
@@ -145,6 +152,7 @@ impl World {
             build: Build::default(),
             lifted: false,
             is_filled: false,
+            closed: [false; 2],
             floating: noise(stream::INPUT),
             tape,
             blocks,
@@ -314,6 +322,18 @@ impl World {
         self.is_filled = is_there;
     }
 
+    /// Closes or opens the contact of reset (0) or mode (1), as a person's finger does.
+    pub fn press(&mut self, button: usize, is_closed: bool) {
+        if let Some(contact) = self.closed.get_mut(button) {
+            *contact = is_closed;
+        }
+    }
+
+    /// What the Pi's lines for buttons show.
+    pub fn levels(&self) -> Levels {
+        self.build.buttons.levels(self.closed)
+    }
+
     /// Puts the robot at a pose, at rest, with nothing held in front of it.
     pub fn place(&mut self, pose: Pose) {
         self.lifted = false;
@@ -353,6 +373,8 @@ impl World {
             battery_charge: self.battery.charge(),
             collisions: self.contact.collisions(),
             obstacles: self.obstacles.standing().to_vec(),
+            closed: self.closed,
+            levels: self.levels(),
         }
     }
 
@@ -363,6 +385,7 @@ impl World {
         self.pose = state.pose;
         self.contact.place(state.pose);
         self.contact.set_collisions(state.collisions);
+        self.closed = state.closed;
         self.battery.set_charge(state.battery_charge);
         self.set_motors(0, 0);
         self.left.set_speed(state.wheel_speeds[0]);

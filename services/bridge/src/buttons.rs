@@ -1,5 +1,5 @@
 //! The robot's reset button and mode switch (B1, E14). They are lines of a GPIO chip, which a
-//! closed contact pulls to ground.
+//! closed contact pulls to ground or to 3.3 V.
 //!
 //! ```text
 //!   reset                  open -> closed    the robot has been put on the delivery node
@@ -18,27 +18,27 @@
 //! - A press that is read a second late does not count: the person has given it up.
 //! - The kernel debounces the lines, and gives each change its time by `CLOCK_MONOTONIC`.
 //! - If a chip cannot be opened, the bridge goes on, logs it, and tries again for ever.
+//! - While somebody finds out how the buttons are connected, they do nothing, and the levels of all
+//!   lines are told instead ([`Listening`]). What was moved meanwhile does not count afterwards.
 //!
 //! What a press of reset does to a stop, `machine/start.rs` decides.
 //!
-//! Below this stands [`Lines`]: on a machine without a chip, a test can move contacts there.
+//! Below this stands [`Gpio`]: on a machine without a chip, a test or a simulated robot moves
+//! contacts there.
+
+mod chip;
+mod watch;
 
 use core::time::Duration;
 use std::io;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use gpiocdev::Request;
-use gpiocdev::line::{Bias, EdgeDetection, EdgeKind, Value};
-use lager_home::Clock;
-use lager_orders::Mode;
 use lager_orders::lease::LATEST_MOVE_NS;
-use serde::{Deserialize, Serialize};
+use lager_orders::{Contact, Levels, Mode, SwitchKind};
 
-/// How often the thread checks whether the bridge ends.
-const LOOK: Duration = Duration::from_millis(100);
-/// After how many checks it tries again to open a chip.
-const LOOKS: u32 = 20;
+pub use chip::Chips;
+pub use watch::{Listening, Told, watch};
+
 /// Nobody presses one button twice within this time, in ns.
 pub const BETWEEN_PRESSES: u64 = 250_000_000;
 
@@ -47,10 +47,10 @@ pub const BETWEEN_PRESSES: u64 = 250_000_000;
 pub struct ButtonsConfig {
     /// The chip, such as `/dev/gpiochip0`.
     pub chip: PathBuf,
-    /// The offset of the reset button's line.
-    pub reset: Option<u32>,
-    /// The offset of the mode switch's line.
-    pub switch: Option<u32>,
+    /// The contact of the reset button.
+    pub reset: Option<Contact>,
+    /// The contact of the mode switch.
+    pub switch: Option<Contact>,
     /// What that switch is.
     pub switch_kind: SwitchKind,
     /// Whether a press of reset at the delivery node ends the stop of a fresh start.
@@ -59,15 +59,12 @@ pub struct ButtonsConfig {
     pub debounce: Duration,
 }
 
-/// What a mode switch tells by its contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SwitchKind {
-    /// A switch that stays where it is moved: its position is the mode.
-    #[default]
-    Position,
-    /// A button that springs back: each press toggles the mode.
-    Press,
+impl ButtonsConfig {
+    /// The contact at a line.
+    pub fn contact(&self, line: u8) -> Option<Contact> {
+        let mut both = self.reset.into_iter().chain(self.switch);
+        both.find(|contact| contact.line == line)
+    }
 }
 
 /// Something that a person has done.
@@ -96,7 +93,7 @@ pub trait Lines {
     ///
     /// # Errors
     /// The chip cannot be read.
-    fn is_closed(&self, line: u32) -> io::Result<bool>;
+    fn is_closed(&self, line: u8) -> io::Result<bool>;
 
     /// The next movement of a contact; `None` if there is none in this time.
     ///
@@ -109,19 +106,43 @@ pub trait Lines {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Movement {
     /// The offset of its line.
-    pub line: u32,
+    pub line: u8,
     /// Whether it is closed since then.
     pub is_closed: bool,
     /// When, in ns of `CLOCK_MONOTONIC`.
     pub at_ns: u64,
 }
 
-/// Opens the lines of a configuration: [`open`], or a test's own function.
-pub type Opener = dyn Fn(&ButtonsConfig) -> io::Result<Box<dyn Lines>> + Send + Sync;
+/// All lines at which a button may be, whatever is connected with them.
+pub trait Survey {
+    /// What they show now.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    fn levels(&mut self) -> io::Result<Levels>;
+
+    /// The number of their chip.
+    fn chip(&self) -> u8;
+}
+
+/// Where the lines are: [`Chips`], a simulated world, or a test's contacts.
+pub trait Gpio: Sync {
+    /// Opens the lines of a configuration.
+    ///
+    /// # Errors
+    /// The chip or one of its lines cannot be opened.
+    fn open(&self, config: &ButtonsConfig) -> io::Result<Box<dyn Lines + '_>>;
+
+    /// Opens all lines at which a button may be. No other program has them, and nothing drives them.
+    ///
+    /// # Errors
+    /// There are none, or they cannot be opened.
+    fn survey(&self) -> io::Result<Box<dyn Survey + '_>>;
+}
 
 /// Turns movements of contacts into actions. Pure.
 #[derive(Clone, Copy, Debug)]
-struct Contacts {
+pub struct Contacts {
     /// The last position of the switch.
     switch: Option<bool>,
     /// The first position sets the mode.
@@ -131,13 +152,19 @@ struct Contacts {
 }
 
 impl Contacts {
-    const fn new(resume: bool) -> Self {
+    /// Those of a bridge that begins, or goes on from an earlier state.
+    pub const fn new(resume: bool) -> Self {
         Self {
             switch: None,
             is_first: !resume,
             reset: Press::NEW,
             mode: Press::NEW,
         }
+    }
+
+    /// Forgets where everything stood: what moves before the next [`Contacts::begin`] does not count.
+    pub const fn forget(&mut self) {
+        (self.switch, self.is_first) = (None, false);
     }
 
     /// The switch is in this position.
@@ -155,15 +182,18 @@ impl Contacts {
     }
 
     /// The lines are open for reading, and `is_closed` says which contacts are closed now.
-    fn begin(
+    ///
+    /// # Errors
+    /// They cannot be read.
+    pub fn begin(
         &mut self,
         config: &ButtonsConfig,
-        is_closed: impl Fn(u32) -> io::Result<bool>,
+        is_closed: impl Fn(u8) -> io::Result<bool>,
     ) -> io::Result<Option<Touch>> {
-        if let Some(line) = config.reset {
-            self.reset.is_closed = is_closed(line)?;
+        if let Some(reset) = config.reset {
+            self.reset.is_closed = is_closed(reset.line)?;
         }
-        let Some(line) = config.switch else {
+        let Some(Contact { line, .. }) = config.switch else {
             return Ok(None);
         };
         Ok(match config.switch_kind {
@@ -176,8 +206,9 @@ impl Contacts {
     }
 
     /// A contact has moved.
-    fn take(&mut self, config: &ButtonsConfig, moved: Movement) -> Option<Touch> {
-        match (Some(moved.line) == config.switch, config.switch_kind) {
+    pub fn take(&mut self, config: &ButtonsConfig, moved: Movement) -> Option<Touch> {
+        let is_switch = (config.switch).is_some_and(|switch| switch.line == moved.line);
+        match (is_switch, config.switch_kind) {
             (true, SwitchKind::Position) => self.switch(moved.is_closed),
             (true, SwitchKind::Press) => self.mode.moves(moved).then_some(Touch::Toggled),
             (false, _) => self.reset.moves(moved).then_some(Touch::Reset),
@@ -210,102 +241,10 @@ impl Press {
     }
 }
 
-/// Passes on what people do, and when they did it (in ns of `CLOCK_MONOTONIC`), until `end`.
-pub fn watch(
-    config: &ButtonsConfig,
-    open: &Opener,
-    resume: bool,
-    end: &AtomicBool,
-    mut touched: impl FnMut(Touch, u64),
-) {
-    let mut contacts = Contacts::new(resume);
-    let mut complaints = 0_u32;
-    while !end.load(Ordering::Acquire) {
-        let watched = open(config)
-            .and_then(|lines| watch_lines(config, &*lines, &mut contacts, end, &mut touched));
-        let Err(error) = watched else { return };
-        complaints = complaints.wrapping_add(1);
-        if complaints.is_power_of_two() {
-            let chip = config.chip.display();
-            tracing::error!(
-                "buttons do not work: {chip}: {error}; `gpioinfo` of libgpiod shows which chips and \
-                 lines there are, and who uses them"
-            );
-        }
-        for _ in 0..LOOKS {
-            if end.load(Ordering::Acquire) {
-                return;
-            }
-            std::thread::sleep(LOOK);
-        }
-    }
-}
-
-/// The lines of a chip of this machine.
-///
-/// # Errors
-/// The chip or one of its lines cannot be opened.
-pub fn open(config: &ButtonsConfig) -> io::Result<Box<dyn Lines>> {
-    let lines: Vec<u32> = config.reset.into_iter().chain(config.switch).collect();
-    let request = Request::builder()
-        .on_chip(&config.chip)
-        .with_consumer("lager")
-        .with_lines(&lines)
-        .as_input()
-        .as_active_low()
-        .with_bias(Bias::PullUp)
-        .with_edge_detection(EdgeDetection::BothEdges)
-        .with_debounce_period(config.debounce)
-        .request();
-    Ok(Box::new(Chip(request.map_err(io::Error::other)?)))
-}
-
-/// Lines that the kernel debounces.
-struct Chip(Request);
-
-impl Lines for Chip {
-    fn is_closed(&self, line: u32) -> io::Result<bool> {
-        let value = self.0.value(line).map_err(io::Error::other)?;
-        Ok(value == Value::Active)
-    }
-
-    fn movement(&self, patience: Duration) -> io::Result<Option<Movement>> {
-        if !(self.0.wait_edge_event(patience)).map_err(io::Error::other)? {
-            return Ok(None);
-        }
-        let edge = self.0.read_edge_event().map_err(io::Error::other)?;
-        Ok(Some(Movement {
-            line: edge.offset,
-            // A line that is active low rises when its contact closes.
-            is_closed: edge.kind == EdgeKind::Rising,
-            at_ns: edge.timestamp_ns,
-        }))
-    }
-}
-
-fn watch_lines(
-    config: &ButtonsConfig,
-    lines: &dyn Lines,
-    contacts: &mut Contacts,
-    end: &AtomicBool,
-    touched: &mut impl FnMut(Touch, u64),
-) -> io::Result<()> {
-    if let Some(touch) = contacts.begin(config, |line| lines.is_closed(line))? {
-        touched(touch, Clock::monotonic_ns());
-    }
-    while !end.load(Ordering::Acquire) {
-        let Some(moved) = lines.movement(LOOK)? else {
-            continue;
-        };
-        if let Some(touch) = contacts.take(config, moved) {
-            touched(touch, moved.at_ns);
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
+    use lager_orders::Level;
+
     use super::*;
 
     #[test]
@@ -331,14 +270,19 @@ mod tests {
         assert_eq!(contacts.switch(false), Some(Touch::Switched(Mode::Manual)));
     }
 
-    const RESET: u32 = 0;
-    const SWITCH: u32 = 1;
+    const RESET: u8 = 0;
+    const SWITCH: u8 = 1;
+
+    fn contact(line: u8) -> Contact {
+        let closed = Level::Low;
+        Contact { line, closed }
+    }
 
     fn config(switch_kind: SwitchKind) -> ButtonsConfig {
         ButtonsConfig {
             chip: "/dev/null".into(),
-            reset: Some(RESET),
-            switch: Some(SWITCH),
+            reset: Some(contact(RESET)),
+            switch: Some(contact(SWITCH)),
             switch_kind,
             reset_starts: true,
             debounce: Duration::from_millis(20),
@@ -346,7 +290,7 @@ mod tests {
     }
 
     /// What comes of a contact that moves `at_ms`.
-    fn moves(contacts: &mut Contacts, line: u32, is_closed: bool, at_ms: u64) -> Option<Touch> {
+    fn moves(contacts: &mut Contacts, line: u8, is_closed: bool, at_ms: u64) -> Option<Touch> {
         let at_ns = at_ms * 1_000_000;
         let moved = Movement {
             line,
@@ -410,17 +354,23 @@ mod tests {
     }
 
     #[test]
-    fn a_chip_that_is_not_there_ends_nothing_and_the_wish_to_end_is_heard() {
-        let config = config(SwitchKind::Position);
-        assert!(open(&config).is_err());
-        let end = AtomicBool::new(false);
-        let nobody = |touch, _| panic!("{touch:?}");
-        std::thread::scope(|scope| {
-            let watching = scope.spawn(|| watch(&config, &open, false, &end, nobody));
-            std::thread::sleep(LOOK * 3);
-            assert!(!watching.is_finished());
-            end.store(true, Ordering::Release);
-            watching.join().expect("it ends");
-        });
+    fn what_moves_while_nobody_counts_it_is_no_press_and_no_new_mode() {
+        for kind in [SwitchKind::Position, SwitchKind::Press] {
+            let config = config(kind);
+            let mut contacts = Contacts::new(false);
+            contacts.begin(&config, |_| Ok(false)).unwrap();
+            contacts.forget();
+            // The switch stands elsewhere now, or a button is held.
+            assert_eq!(contacts.begin(&config, |_| Ok(true)).unwrap(), None);
+            let moved = |line, is_closed, at_ns| Movement {
+                line,
+                is_closed,
+                at_ns,
+            };
+            assert_eq!(contacts.take(&config, moved(RESET, false, 1)), None);
+            let back = contacts.take(&config, moved(SWITCH, false, 1));
+            let manual = (kind == SwitchKind::Position).then_some(Touch::Switched(Mode::Manual));
+            assert_eq!(back, manual, "its next movement counts");
+        }
     }
 }

@@ -61,14 +61,14 @@ impl Calibration {
     /// The board has answered for the second time.
     pub(crate) fn hear(&mut self, reply: &SettingReply) {
         match (reply.status, reply.value) {
-            // This repeats the first answer.
-            (SettingStatus::Accepted, 1) => {}
+            // This repeats the first answer, or that it was taken back.
+            (SettingStatus::Accepted, 1 | 2) => {}
             (SettingStatus::Accepted, sensors) => self.end(State::Done, sensors),
             (_, sensors) => self.end(State::Partly, sensors),
         }
     }
 
-    /// The board has gone or has restarted.
+    /// The board has gone or has restarted, or somebody takes the calibration back.
     pub(crate) fn break_off(&mut self) {
         if self.state == State::Running {
             self.end(State::BrokenOff, 0);

@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use lager_bridge::buttons::{ButtonsConfig, SwitchKind, Touch, open, watch};
-use lager_orders::Mode;
+use lager_bridge::buttons::{ButtonsConfig, Chips, Listening, Touch, watch};
+use lager_orders::{Contact, Level, Mode, SwitchKind};
 
 const SIMULATOR: &str = "/sys/kernel/config/gpio-sim";
 /// How long a touch is waited for before the test has failed.
 const WATCHDOG: Duration = Duration::from_secs(20);
-const RESET: u32 = 0;
-const SWITCH: u32 = 1;
+const RESET: u8 = 0;
+const SWITCH: u8 = 1;
 
 /// A simulated chip with two lines; it is gone when this is dropped.
 struct Chip {
@@ -43,7 +43,7 @@ impl Chip {
     }
 
     /// Closes a contact to ground, or opens it.
-    fn contact(&self, line: u32, is_closed: bool) {
+    fn contact(&self, line: u8, is_closed: bool) {
         let pull = self.lines.join(format!("sim_gpio{line}/pull"));
         let to = if is_closed { "pull-down" } else { "pull-up" };
         fs::write(pull, to).expect("a line of the simulated chip");
@@ -66,19 +66,25 @@ fn what_people_do_to_the_lines_of_a_chip_is_heard() {
     chip.contact(SWITCH, true);
     let config = ButtonsConfig {
         chip: chip.device.clone(),
-        reset: Some(RESET),
-        switch: Some(SWITCH),
+        reset: Some(contact(RESET)),
+        switch: Some(contact(SWITCH)),
         switch_kind: SwitchKind::Position,
         reset_starts: true,
         debounce: Duration::from_millis(5),
     };
-    let end = AtomicBool::new(false);
+    let (end, listening) = (AtomicBool::new(false), Listening::default());
     let (to, touches) = mpsc::channel();
     std::thread::scope(|scope| {
         scope.spawn(|| {
-            watch(&config, &open, false, &end, |touch, _| {
-                to.send(touch).expect("it is waited for");
-            });
+            watch(
+                Some(&config),
+                &Chips,
+                false,
+                (&end, &listening),
+                |touch, _| {
+                    to.send(touch).expect("it is waited for");
+                },
+            );
         });
         let next = || touches.recv_timeout(WATCHDOG).expect("a touch");
         assert_eq!(next(), Touch::Switched(Mode::Autonomous), "where it stands");
@@ -95,4 +101,9 @@ fn what_people_do_to_the_lines_of_a_chip_is_heard() {
         );
         end.store(true, Ordering::Release);
     });
+}
+
+fn contact(line: u8) -> Contact {
+    let closed = Level::Low;
+    Contact { line, closed }
 }

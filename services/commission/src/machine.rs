@@ -9,20 +9,21 @@
 //!     '────────────────────> the wheels turn ────┘
 //! ```
 //!
-//! Of the arm, `machine/arm.rs` draws what is beside this.
+//! Of the arm, `machine/arm.rs` draws what is beside this, and `machine/buttons.rs` of the buttons.
 //!
 //! In every state a failure ends the step: the robot stands, what held before the step holds again,
 //! and the step begins anew with a sentence that says why.
 
 mod answers;
 mod arm;
+mod buttons;
 mod shown;
 mod tells;
 
 use core::time::Duration;
 
 use lager_operator::{Driving, For, Ids};
-use lager_orders::{Moment, Reason};
+use lager_orders::{Buttons, Moment, Reason};
 use lager_topics::{Calibration, Health, Outcome, Part, SteeringOrder, SteeringReport};
 use lager_wire::{Centimetres, LineBits, OperatorCommand, RobotProfile};
 
@@ -32,7 +33,7 @@ use crate::recent::Recent;
 use crate::step::{Question, Step, Takes};
 use crate::words::Said;
 use crate::{line, range, wheels};
-use tells::{TOLD, is_obeyed};
+use tells::{TOLD, Thresholds, is_obeyed};
 
 /// How long the wheels turn when they are lifted.
 const PULSE: Duration = Duration::from_millis(500);
@@ -58,6 +59,8 @@ pub struct Built {
     pub reach_shoulder: u16,
     /// Of the elbow.
     pub reach_elbow: u16,
+    /// The robot's own buttons.
+    pub buttons: Buttons,
 }
 
 /// Something that the caller must do.
@@ -70,6 +73,12 @@ pub enum Effect {
     Steer(SteeringOrder),
     /// Let the sensor board calibrate its line sensors.
     Calibrate,
+    /// Let the sensor board have the thresholds from before its calibration, and hand the bridge's
+    /// answer in ([`Commissioning::uncalibrated`]).
+    Uncalibrate,
+    /// Ask the bridge what the buttons' lines show, and hand its answer in
+    /// ([`Commissioning::lines`]).
+    Listen,
     /// Save this for good.
     Keep(Built),
 }
@@ -128,12 +137,15 @@ pub struct Commissioning {
     told: [Option<RobotProfile>; TOLD.len()],
     /// What the bridge was asked to tell, and has not answered yet.
     under_way: Option<RobotProfile>,
+    /// How far a calibration has changed the line sensors' thresholds.
+    thresholds: tells::Thresholds,
     /// The hash of it in `link/health`, once that has come.
     description: Option<u32>,
     /// The person ends it, and the boards are told what they were told before.
     is_leaving: bool,
     found: Found,
     arm: arm::Work,
+    buttons: buttons::Work,
     /// What is told now is told to listen to the servos afterwards.
     listens: bool,
     health: Option<(Duration, Health)>,
@@ -163,10 +175,12 @@ impl Commissioning {
             is_tried: false,
             told: [None; TOLD.len()],
             under_way: None,
+            thresholds: tells::Thresholds::default(),
             description: None,
             is_leaving: false,
             found: Found::default(),
             arm: arm::Work::default(),
+            buttons: buttons::Work::default(),
             listens: false,
             health: None,
             epochs: None,
@@ -206,6 +220,11 @@ impl Commissioning {
     /// Whether it lets the robot move at present.
     pub const fn moves(&self) -> bool {
         self.driving.is_running()
+    }
+
+    /// Whether the line sensors have other thresholds than before.
+    pub fn has_calibrated(&self) -> bool {
+        self.thresholds != Thresholds::Former
     }
 
     /// How the robot is built, by what is known so far.
@@ -265,7 +284,7 @@ impl Commissioning {
     /// To be called with the bridge's answer to [`Effect::Calibrate`]; `None` if there was none.
     pub fn calibrates(&mut self, now: Moment, outcome: Option<Outcome>) {
         match outcome {
-            Some(Outcome::Done) => {}
+            Some(Outcome::Done) => self.thresholds = Thresholds::New,
             Some(why) => self.fail(now, Reason::from(why)),
             None => self.fail(now, "bridge_silent"),
         }
@@ -311,6 +330,7 @@ impl Commissioning {
         if is_busy && !self.is_leaving && self.known(now.robot).is_none() {
             return self.fall_back(now, "bridge_silent");
         }
+        self.listen(now);
         let past = |since: Duration, span| now.robot >= since + span;
         match self.state {
             State::Tells { since, .. } if past(since, TELL) => self.undescribed(now),
@@ -406,6 +426,7 @@ impl Commissioning {
         self.built = self.original;
         self.is_leaving = true;
         self.state = State::Over;
+        self.take_thresholds_back();
         if self.is_tried {
             self.tell(now, self.built.robot);
         }
@@ -418,6 +439,7 @@ impl Commissioning {
             return;
         }
         self.fall_back(now, "nobody_there");
+        self.take_thresholds_back();
         if self.is_tried {
             self.tell(now, self.original.robot);
         }
@@ -458,6 +480,7 @@ impl Commissioning {
         self.step = step;
         self.found = Found::default();
         (self.arm, self.listens) = (arm::Work::default(), false);
+        self.buttons = buttons::Work::default();
         self.epochs = None;
         self.built = self.before[step as usize];
         self.ask(step.first());
@@ -466,6 +489,8 @@ impl Commissioning {
         }
         let mut trial = self.built.robot;
         match step {
+            // Whoever comes back to it begins with what held before it.
+            Step::Line => self.take_thresholds_back(),
             Step::Distance => trial.sensors.ranger = MEASURING,
             Step::Wheels => trial.steering.wheels = wheels::plain(trial.steering.wheels),
             Step::Battery => trial.steering.divider = true,

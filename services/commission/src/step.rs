@@ -33,13 +33,15 @@ pub enum Step {
     Joints,
     /// How far the claw closes, and how hard.
     Claw,
+    /// Which lines the robot's own buttons are at, and how each of them works.
+    Buttons,
     /// Whether it is saved.
     Finish,
 }
 
 impl Step {
     /// All steps, in their order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Boards,
         Self::Line,
         Self::Distance,
@@ -51,6 +53,7 @@ impl Step {
         Self::Poses,
         Self::Joints,
         Self::Claw,
+        Self::Buttons,
         Self::Finish,
     ];
 
@@ -68,6 +71,7 @@ impl Step {
             Self::Poses => Question::Poses,
             Self::Joints => Question::JointMoves,
             Self::Claw => Question::ClawEmpty,
+            Self::Buttons => Question::ButtonsFree,
             Self::Finish => Question::Finish,
         }
     }
@@ -128,12 +132,16 @@ pub enum Question {
     JointMoves,
     ClawEmpty,
     ClawFull,
+    ButtonsFree,
+    ResetButton,
+    ModeSwitch,
+    SwitchAutonomous,
     Finish,
 }
 
 impl Question {
     /// All questions, in their order.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 30] = [
         Self::Boards,
         Self::LineSway,
         Self::LineFloor,
@@ -159,6 +167,10 @@ impl Question {
         Self::JointMoves,
         Self::ClawEmpty,
         Self::ClawFull,
+        Self::ButtonsFree,
+        Self::ResetButton,
+        Self::ModeSwitch,
+        Self::SwitchAutonomous,
         Self::Finish,
     ];
 
@@ -194,6 +206,10 @@ impl Question {
             Self::JointMoves => "ask_joint_moves",
             Self::ClawEmpty => "ask_claw_empty",
             Self::ClawFull => "ask_claw_full",
+            Self::ButtonsFree => "ask_buttons_free",
+            Self::ResetButton => "ask_reset_button",
+            Self::ModeSwitch => "ask_mode_switch",
+            Self::SwitchAutonomous => "ask_switch_autonomous",
             Self::Finish => "ask_finish",
         }
     }

@@ -56,6 +56,11 @@ impl Said {
         Self::new("ended_undone", &[("path", &path.display())])
     }
 
+    /// The same, but the line sensors' thresholds are those of the last calibration.
+    pub fn undone_but_thresholds(path: &Path) -> Self {
+        Self::new("ended_undone_but", &[("path", &path.display())])
+    }
+
     /// Nothing is written.
     pub fn nothing() -> Self {
         "ended_nothing".into()

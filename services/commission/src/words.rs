@@ -105,6 +105,7 @@ mod tests {
             include_str!("machine.rs"),
             include_str!("machine/answers.rs"),
             include_str!("machine/shown.rs"),
+            include_str!("machine/tells.rs"),
             include_str!("step.rs"),
             include_str!("told.rs"),
             include_str!("line.rs"),
@@ -113,6 +114,7 @@ mod tests {
             include_str!("answer.rs"),
             include_str!("arm.rs"),
             include_str!("machine/arm.rs"),
+            include_str!("machine/buttons.rs"),
         ];
         let mut names = BTreeSet::new();
         for sentence in sentences() {

@@ -17,7 +17,8 @@ use lager_commission::{Built, Said};
 use lager_ports::{Bus, BusConfig};
 use lager_station::files::Hold;
 use lager_supervisor::console;
-use lager_topics::Role;
+use lager_supervisor::hands::Hands;
+use lager_topics::{Outcome, Role, ThoughtKind};
 use lager_wake::Shutdown;
 
 use crate::cli::CommissionArgs;
@@ -26,6 +27,8 @@ use crate::diagnose;
 use crate::exit;
 use crate::time_limit::TimeLimit;
 use bench::Bench;
+#[cfg(test)]
+pub use bench::uncalibrate;
 
 /// Runs it. `configured` is the configuration without the description of the robot.
 ///
@@ -37,7 +40,7 @@ pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> R
     }
     let robot = Robot::new(configured)?;
     if args.undo {
-        tell(&robot.undo()?)?;
+        tell(&robot.undo(shutdown)?)?;
         return Ok(ExitCode::SUCCESS);
     }
     let (mut bench, patience) = robot.bench(shutdown)?;
@@ -50,13 +53,13 @@ pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> R
     };
     patience.watchdog.leave();
     let new = robot.with(&built);
-    let path = robot.keep(&new).with_context(|| {
+    let path = robot.keep(&new, &bench).with_context(|| {
         // A quarter of an hour's work must not be lost.
         let _ = console::print(new.described().trim_end());
         "the description above is not saved"
     })?;
     patience.watchdog.enter("waiting for the robot");
-    bench.settle(&built);
+    bench.settle(&built, ThoughtKind::SetUpInTerminal);
     tell(&Said::kept(&path))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -94,9 +97,26 @@ impl Robot {
         })
     }
 
-    /// Puts the former description back.
-    fn undo(&self) -> Result<Said> {
-        Ok(Said::undone(&self.running.forget_description()?))
+    /// Puts the former description back, and the former thresholds of the line sensors if they have
+    /// others since. Only their board knows those, so the robot must be up for that.
+    fn undo(&self, shutdown: &Shutdown) -> Result<Said> {
+        let (path, has_calibrated) = self.running.forget_description()?;
+        if has_calibrated {
+            let taken_back = self.uncalibrate(shutdown);
+            if !matches!(taken_back, Ok(Some(Outcome::Done))) {
+                tracing::warn!("the former thresholds are not back: {taken_back:?}");
+                return Ok(Said::undone_but_thresholds(&path));
+            }
+            self.running.forget_calibration()?;
+        }
+        Ok(Said::undone(&path))
+    }
+
+    /// Asks the bridge to have the former thresholds put back.
+    fn uncalibrate(&self, shutdown: &Shutdown) -> Result<Option<Outcome>> {
+        let (bus, _patience) = self.bus(shutdown)?;
+        let answer = Hands::new(&bus)?.ask(bench::uncalibrate())?;
+        Ok(answer.outcome.get())
     }
 
     /// The robot on its bus, which is used only under the watch.
@@ -104,6 +124,12 @@ impl Robot {
     /// # Errors
     /// The robot is not up, or its bus cannot be joined.
     fn bench(&self, shutdown: &Shutdown) -> Result<(Bench, TimeLimit)> {
+        let (bus, patience) = self.bus(shutdown)?;
+        let bench = Bench::new(&self.configured, bus, self.running.commissioned())?;
+        Ok((bench, patience))
+    }
+
+    fn bus(&self, shutdown: &Shutdown) -> Result<(Bus, TimeLimit)> {
         diagnose::must_be_up(&self.configured)?;
         let patience = TimeLimit::in_order(&self.configured, shutdown)?;
         let BusConfig { speed, clock, .. } = self.running.bus()?;
@@ -113,9 +139,7 @@ impl Robot {
             ..self.configured.bus()?
         };
         patience.watchdog.enter("joining the bus");
-        let bus = Bus::open(&bus, Role::Operator)?;
-        let bench = Bench::new(&self.configured, bus, self.running.commissioned())?;
-        Ok((bench, patience))
+        Ok((Bus::open(&bus, Role::Operator)?, patience))
     }
 
     /// The robot as it was found out.
@@ -126,7 +150,7 @@ impl Robot {
     }
 
     /// Writes what was found out. Returns the file.
-    fn keep(&self, new: &Config) -> Result<PathBuf> {
-        new.keep_description(&self.configured)
+    fn keep(&self, new: &Config, bench: &Bench) -> Result<PathBuf> {
+        new.keep_description(&self.configured, bench.machine.has_calibrated())
     }
 }

@@ -31,6 +31,7 @@ mod report;
 mod shell;
 mod sigbus;
 mod simulate;
+mod simulated_lines;
 mod stack;
 mod station;
 mod steer;
@@ -169,7 +170,14 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                     waiting: config.bus.policy(),
                     resume,
                 };
-                Ok(lager_bridge::run(bus, &bridge, &shutdown)?)
+                Ok(match config.body {
+                    Body::Serial => lager_bridge::run(bus, &bridge, &shutdown)?,
+                    // The buttons of a simulated robot are in its world.
+                    Body::Sim | Body::Chip => {
+                        let lines = simulated_lines::World(bus);
+                        lager_bridge::run_with(bus, &bridge, &lines, &shutdown)?;
+                    }
+                })
             })?;
             return Ok(ExitCode::SUCCESS);
         }

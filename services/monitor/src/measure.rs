@@ -67,7 +67,6 @@ pub(crate) struct Plan<F> {
     /// The head line; empty for none.
     pub(crate) head: &'static str,
     /// Whether it compares stamps with this machine's clock, which a robot elsewhere has not.
-    #[cfg_attr(not(feature = "zenoh"), expect(dead_code))]
     pub(crate) needs_clock: bool,
     /// Makes a gauge for payloads of this many bytes.
     pub(crate) gauge: F,
@@ -81,6 +80,9 @@ impl<W: Write, P: Place> Tools<'_, W, P> {
         mut from: impl Source,
         plan: &Plan<F>,
     ) -> Result<(), ToolError> {
+        if plan.needs_clock && self.place.now_ns().is_none() {
+            return Err(ToolError::OtherClock);
+        }
         let began = Instant::now();
         let (mut total, mut lost, mut is_over) = (0, 0, false);
         let mut heard = began;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::extension::Spelled;
-use lager_orders::{Action, Code, Late, Mode, Reason};
+use lager_orders::{Action, Code, Commission, Late, Mode, Reason};
 use lager_plant::Warehouse;
 use lager_station::{
     Awaited, Doing, Driver, Given, History, LastTold, Reply, Saving, Subscription, Uses, View,
@@ -300,7 +300,11 @@ impl Visit {
         // What is held, steps and answers would be all that there is to read.
         let is_many = matches!(
             action.what,
-            Action::Drive { .. } | Action::Arm(_) | Action::Commission(_)
+            Action::Drive { .. }
+                | Action::Arm(_)
+                | Action::Commission(
+                    Commission::Here | Commission::Stand | Commission::Answer { .. }
+                )
         );
         if !is_many {
             self.note(robot, &Spelled(&action.what).to_string());

@@ -22,6 +22,10 @@ pub fn message(truth: &Snapshot) -> topics::Truth {
         servo_position: world.servo_positions,
         battery_charge: world.battery_charge as f32,
         collisions: world.collisions,
+        reset_closed: world.closed[0].into(),
+        mode_closed: world.closed[1].into(),
+        lines_low: world.levels.low,
+        lines_high: world.levels.high,
         ..topics::Truth::default()
     };
     for (place, good) in message.goods.iter_mut().zip(&world.goods) {
@@ -88,6 +92,8 @@ pub fn world_state(message: &topics::Truth) -> WorldState {
         battery_charge: f64::from(message.battery_charge),
         collisions: message.collisions,
         obstacles: obstacles.collect(),
+        closed: [message.reset_closed, message.mode_closed].map(|closed| closed != 0),
+        levels: message.levels(),
     }
 }
 
@@ -131,6 +137,11 @@ mod tests {
                     by_chance: false,
                 },
             ],
+            closed: [true, false],
+            levels: topics::Levels {
+                low: 1 << 17,
+                high: 1 << 27,
+            },
         };
         let truth = Snapshot {
             world: world.clone(),

@@ -30,6 +30,7 @@ pub fn wish(warehouse: &Warehouse, ask: &WorldAsk) -> Result<Hand, WorldAnswer> 
             WorldAskKind::Hold => Some(Hand::Hold(ask.x)),
             WorldAskKind::Bring => Some(Hand::Bring(ask.x, u16::from(ask.y) * 4)),
             WorldAskKind::Fill => Some(Hand::Fill(ask.x != 0)),
+            WorldAskKind::Press => Some(Hand::Press(ask.x, ask.y != 0)),
             WorldAskKind::Shift => Some(Hand::Shift(i16::from(ask.x) - 128)),
         }
     };

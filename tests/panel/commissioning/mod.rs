@@ -75,7 +75,7 @@ fn swedish(name: &str) -> &'static str {
 #[test]
 fn a_robot_that_nobody_described_is_set_up_by_clicks_and_delivers() {
     let (mut scene, config) = unknown();
-    let mut person = Person::new(&scene);
+    let mut person = Person::new(&scene, other().1.buttons);
     person.begin();
     let (mut was_reloaded, mut was_stopped) = (false, false);
     loop {
@@ -201,7 +201,7 @@ fn whoever_dies_in_the_middle_the_robot_stands_and_its_boards_are_as_they_were()
         })
     };
     let before = described("the boards", &|_| true);
-    let mut person = Person::new(&scene);
+    let mut person = Person::new(&scene, other().1.buttons);
     // The process that commissions is killed, and then comm, whose child it is.
     for whose in ["commissioning", "comm"] {
         person.begin();
@@ -229,9 +229,7 @@ fn whoever_dies_in_the_middle_the_robot_stands_and_its_boards_are_as_they_were()
     person.answered.clear();
     person.until("ask_range_far");
     described("a trial", &|now| now != before);
-    let Person {
-        page, truth, hands, ..
-    } = person;
+    let Person { page, hands, .. } = person;
     page.close();
     described("what was before", &|now| now == before);
     let kept = fs::read_to_string(scene.domain.folder().join("robot.toml"));
@@ -240,7 +238,7 @@ fn whoever_dies_in_the_middle_the_robot_stands_and_its_boards_are_as_they_were()
         arm(&other().1.arm),
         "nothing is written"
     );
-    drop((truth, hands, health));
+    drop((hands, health));
     scene.end();
 }
 
@@ -322,7 +320,7 @@ fn the_reason_why_it_stands_leads_there_and_keys_alone_answer() {
 #[test]
 fn a_joint_moves_only_while_its_button_is_held_by_mouse_or_key_and_never_after_a_stop() {
     let (mut scene, _) = unknown();
-    let mut person = Person::new(&scene);
+    let mut person = Person::new(&scene, other().1.buttons);
     person.begin();
     person.answered.clear();
     person.until("ask_joint_moves");

@@ -156,6 +156,11 @@ coded! {
         /// Reset was pressed on a robot that did not know that it stands on the delivery node; the
         /// stop stays, and the next press may end it.
         ResetElsewhere = 67,
+        /// A commissioning in a terminal has saved how the robot is built; `seen` is the number of the
+        /// user.
+        SetUpInTerminal = 68,
+        /// The same at a page, by whoever has its wheel.
+        SetUpAtPage = 69,
     }
 }
 

@@ -20,7 +20,7 @@ mod truth;
 pub use action::{Input, InputKind};
 pub use failure::{Failure, FailureKind, Remedy};
 pub use inputs::{Beside, NavigatorInput, NavigatorInputKind, NavigatorInputs, Sent, TextKind};
-pub use lager_orders::EventKind;
+pub use lager_orders::{EventKind, Levels};
 pub use latency::{CommandLatency, Durations, PathLatency};
 pub use link::{BoardHealth, CalibratedSensor, Calibration, Health, Misfit, ProfileState};
 pub use log::{Joint, Thought, ThoughtKind};
@@ -32,7 +32,8 @@ pub use nav::{
 };
 pub use pose::Pose;
 pub use request::{
-    Ask, AskKind, BridgeAnswer, Outcome, Part, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,
+    Ask, AskKind, BridgeAnswer, ButtonLines, Outcome, Part, WorldAnswer, WorldAsk, WorldAskKind,
+    WorldRefusal,
 };
 pub use said::word;
 pub use sensor::{DistanceFrame, LineFrame};

@@ -5,7 +5,7 @@ use lager_floor::Heading;
 use core::fmt;
 use core::time::Duration;
 
-use lager_orders::{Mode, Reason};
+use lager_orders::{Levels, Mode, Reason};
 use lager_sample::{Tag, coded, payload};
 use lager_wire::{Callsign, Profile, RobotProfile};
 
@@ -36,6 +36,23 @@ coded! {
         /// Restart `board`, while the robot stands. "Done" means that it was told to; `link/health`
         /// shows when it is up again.
         Restart = 6,
+        /// Tell what the lines of the robot's own buttons show, and let these do nothing for
+        /// `trial_ms`. The same request again prolongs that. Refused while the robot is autonomous.
+        Listen = 7,
+        /// Let the sensor board have the thresholds from before its last calibration.
+        Uncalibrate = 8,
+    }
+}
+
+coded! {
+    /// What is known of the lines at which buttons may be.
+    pub enum ButtonLines {
+        /// Nobody has looked at them yet.
+        Unread = 0,
+        /// The answer says what they show.
+        Read = 1,
+        /// The robot's machine has no such lines, or they cannot be read.
+        Absent = 2,
     }
 }
 
@@ -149,6 +166,16 @@ impl Ask {
         }
     }
 
+    /// The request to tell what the buttons' lines show, and to let the buttons do nothing for
+    /// [`Ask::TRIAL`].
+    pub fn listen() -> Self {
+        Self {
+            kind: AskKind::Listen.into(),
+            trial_ms: Self::TRIAL.as_millis() as u16,
+            ..Self::default()
+        }
+    }
+
     /// The request to tell how a part of `robot` is built, until the bridge ends.
     pub fn describe(part: Part, robot: &RobotProfile) -> Self {
         let mut ask = Self {
@@ -209,6 +236,9 @@ coded! {
         Bring = 6,
         /// Hold a piece of goods between the jaws (`x` = 1), or take it away (`x` = 0).
         Fill = 7,
+        /// Close (`y` = 1) or open (`y` = 0) the contact of the reset button (`x` = 0), or that of the
+        /// mode switch or mode button (`x` = 1), where the robot has them.
+        Press = 8,
     }
 }
 
@@ -283,7 +313,7 @@ payload! {
 
 payload! {
     /// The bridge's answer: the result and what is now in force.
-    pub struct BridgeAnswer: 8 bytes {
+    pub struct BridgeAnswer: 16 bytes {
         /// The result of the request.
         pub outcome: Tag<Outcome>,
         /// The mode in force.
@@ -294,8 +324,26 @@ payload! {
         pub gain_p: u8,
         /// Gain in force, 0 = not known.
         pub gain_d: u8,
+        /// What is known of the buttons' lines.
+        pub button_lines: Tag<ButtonLines>,
+        /// The number of their chip.
+        pub button_chip: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 3],
+        pub reserved: u8,
+        /// A bit for each line that something pulls low.
+        pub lines_low: u32,
+        /// A bit for each line that something pulls high.
+        pub lines_high: u32,
+    }
+}
+
+impl BridgeAnswer {
+    /// What the buttons' lines show.
+    pub const fn levels(&self) -> Levels {
+        Levels {
+            low: self.lines_low,
+            high: self.lines_high,
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! [`Truth`]: the simulated world as it really is, on `truth/pose`. Real robots do not publish it.
 
 use lager_floor::Heading;
+use lager_orders::Levels;
 
 use super::SERVO_UNKNOWN;
 use lager_sample::{Tag, coded, payload};
@@ -54,7 +55,7 @@ payload! {
 
 payload! {
     /// The world. This is enough to resume the world in another process.
-    pub struct Truth: 5456 bytes {
+    pub struct Truth: 5464 bytes {
         /// Robot time since the start of the world in ns.
         pub time_ns: u64,
         /// Middle of the axle in mm, x to the right.
@@ -89,9 +90,17 @@ payload! {
         pub obstacles: [TruthObstacle; 64],
         /// How many of `obstacles` are used.
         pub obstacle_count: u16,
+        /// 1 = the contact of the reset button is closed.
+        pub reset_closed: u8,
+        /// 1 = the contact of the mode switch or mode button is closed.
+        pub mode_closed: u8,
+        /// A bit for each line of the Pi that a button pulls low.
+        pub lines_low: u32,
+        /// A bit for each line of the Pi that a button pulls high.
+        pub lines_high: u32,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 6],
+        pub reserved: [u8; 4],
     }
 }
 
@@ -99,6 +108,14 @@ impl Truth {
     /// The goods in use.
     pub fn goods(&self) -> &[TruthGood] {
         &self.goods[..usize::from(self.good_count).min(self.goods.len())]
+    }
+
+    /// What the Pi's lines for buttons show.
+    pub const fn levels(&self) -> Levels {
+        Levels {
+            low: self.lines_low,
+            high: self.lines_high,
+        }
     }
 
     /// The things that stand on edges.

@@ -1,5 +1,5 @@
 //! Requests: to change the mode, to release a stop, to set values of the boards, to have them told how
-//! the robot is built, and to restart them.
+//! the robot is built, to listen to its buttons, and to restart the boards.
 //!
 //! They stand apart because an answer may have to wait for a board or for the stop word, and the
 //! core's turns go on meanwhile. One request is under way at a time.
@@ -65,8 +65,11 @@ impl BridgeCore {
             (Some(AskKind::Calibrate), _) if self.is_under_way() => Answered(Outcome::UnderWay),
             // "Done" means that it has begun; `link/health` reports its end.
             (Some(AskKind::Calibrate), _) => self.set(now.robot, &[SettingKey::Calibrate], &[1]),
+            (Some(AskKind::Uncalibrate), _) if self.is_under_way() => Answered(Outcome::UnderWay),
+            (Some(AskKind::Uncalibrate), _) => self.set(now.robot, &[SettingKey::Calibrate], &[2]),
             (Some(AskKind::Restart), _) => Answered(self.restart(ask)),
             (Some(AskKind::Describe), _) => self.describe(now.robot, ask),
+            (Some(AskKind::Listen), _) => self.listen(now.robot, ask),
             (Some(AskKind::SetMode), None) | (None, _) => Answered(Outcome::Refused),
         });
     }
@@ -160,14 +163,16 @@ impl BridgeCore {
             let value = self.settings.in_force(key).unwrap_or(0);
             u8::try_from(value).unwrap_or(0)
         };
-        Some(BridgeAnswer {
+        let mut answer = BridgeAnswer {
             outcome: outcome.into(),
             mode: self.arbiter.mode().into(),
             stopped: self.arbiter.is_stopped().into(),
             gain_p: gain(SettingKey::GainP),
             gain_d: gain(SettingKey::GainD),
             ..BridgeAnswer::default()
-        })
+        };
+        self.listener.fill(&mut answer);
+        Some(answer)
     }
 
     /// The result of [`Effect::Release`](super::Effect::Release): the word is clear, or it has a
@@ -235,7 +240,10 @@ impl BridgeCore {
             _ => Outcome::NoBoard,
         };
         if outcome == Outcome::Done && keys == [SettingKey::Calibrate] {
-            self.calibration.begin();
+            match self.settings.in_force(SettingKey::Calibrate) {
+                Some(2) => self.calibration.break_off(),
+                _ => self.calibration.begin(),
+            }
             self.due.health = true;
         }
         self.asked = Some(Asked::Answered(outcome));

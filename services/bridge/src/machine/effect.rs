@@ -8,6 +8,7 @@ use lager_topics::{AskKind, Part, ProfileState, StopCause, ThoughtKind};
 use lager_wire::{Callsign, PACKET_LENGTH, SteerCommand};
 
 use crate::arbiter::OrderKey;
+use crate::buttons::Touch;
 use crate::events::BoardUp;
 
 /// One thing to do.
@@ -97,6 +98,10 @@ pub enum Notice {
     Reset(ThoughtKind),
     /// A request has set the mode.
     ModeSet(Mode),
+    /// What somebody did with a button came so many ms late.
+    LateTouch(Touch, u64),
+    /// Somebody finds out how the buttons are connected, or does not any more.
+    Listened(bool),
     /// A request came too late.
     Late(Option<AskKind>),
 }

@@ -23,12 +23,14 @@
 //! steps of the arm run once, so they go out after the state.
 //!
 //! * `asks`: requests.
+//! * `buttons`: what comes of a touch of the robot's own buttons, and who listens to their lines.
 //! * `ports`: the events of the ports.
 //! * `publishing`: the states that it publishes.
 //! * `rest`: when a stop has come to its end.
 //! * `start`: what a press of reset does to a stop.
 
 mod asks;
+mod buttons;
 mod effect;
 mod ports;
 mod publishing;
@@ -113,6 +115,7 @@ pub struct BridgeCore {
     is_lent: bool,
     rest: Rest,
     asked: Option<Asked>,
+    listener: buttons::Listener,
     /// The stop is being released for a press of reset, and not for a request.
     starts: bool,
     parking: Option<Parking>,
@@ -247,6 +250,7 @@ impl BridgeCore {
             is_lent: false,
             rest: Rest::default(),
             asked: None,
+            listener: buttons::Listener::default(),
             starts: false,
             parking: None,
             due: Due {
@@ -293,14 +297,6 @@ impl BridgeCore {
         let verdict = self.arbiter.order(sent, age, order);
         let (key, _) = self.arbiter.current()?;
         (verdict == Verdict::Executes).then_some(key)
-    }
-
-    /// Somebody moved the switch to `mode`, or pressed the mode button.
-    pub fn switch(&mut self, mode: Mode) {
-        if self.arbiter.mode() != mode {
-            self.say(Notice::Pressed(mode));
-        }
-        self.arbiter.set_mode(mode);
     }
 
     /// The stop word has been set: standby is due before everything else.
@@ -364,6 +360,7 @@ impl BridgeCore {
     pub fn decide(&mut self, now: Duration) {
         self.wake(now);
         self.take_back_trials(now);
+        self.end_listening(now);
         self.arbiter.advance(now);
         if self.is_stopped() {
             self.stopped_at.get_or_insert(now);
@@ -418,7 +415,8 @@ impl BridgeCore {
             .into_iter()
             .filter(|board| self.boards.place(*board).is_some())
             .filter_map(|board| self.settings.next_due(board))
-            .chain(self.profiles.next_due());
+            .chain(self.profiles.next_due())
+            .chain(self.listener.next_due());
         settings
             .chain(self.arbiter.next_due())
             .fold(self.health_due, Duration::min)

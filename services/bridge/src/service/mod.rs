@@ -26,26 +26,25 @@ use std::time::Duration;
 
 use heapless::spsc::{Consumer, Queue};
 use lager_home::Clock;
-use lager_orders::{Mode, Moment};
+use lager_orders::Moment;
 use lager_ports::{
     Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, Sample, Server, Subscriber,
 };
 use lager_sample::Topic;
 use lager_stop::{StopError, StopPage};
 use lager_topics::{
-    Ask, BridgeAnswer, BridgeRequest, Health, Input, InputKind, LatencyCommand, LinkHealth,
-    LogThought, NavStatus, NavigatorStatus, OperatorInput, Origin, SteeringCommand, SteeringState,
-    StopCause,
+    Ask, BridgeAnswer, BridgeRequest, Health, Input, LatencyCommand, LinkHealth, LogThought,
+    NavStatus, NavigatorStatus, OperatorInput, Origin, SteeringCommand, SteeringState, StopCause,
 };
 use lager_wake::{Shutdown, Waiter, urgency};
 
-use crate::buttons::{self, Opener, Touch};
+use crate::buttons::{self, Chips, Gpio, Listening, Touch};
 use crate::config::BridgeConfig;
 use crate::counts::Counts;
 use crate::events::PortEvent;
 use crate::latency::CommandMeter;
 use crate::loan::{Loan, Looking};
-use crate::machine::{BridgeCore, CoreOptions, ResetPress};
+use crate::machine::{BridgeCore, CoreOptions};
 use crate::reader::{Handed, QUEUE, Reader};
 use crate::serial::{PacketWriter, SerialPort};
 use crate::source::Source;
@@ -83,17 +82,17 @@ pub enum BridgeError {
 /// # Errors
 /// The bridge's ports on the bus, or its stop word, cannot be opened; the sentence says what to do.
 pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), BridgeError> {
-    run_with(bus, config, &buttons::open, shutdown)
+    run_with(bus, config, &Chips, shutdown)
 }
 
-/// The same; `open` opens the buttons' lines, for machines without a chip.
+/// The same; `gpio` has the buttons' lines, for machines without a chip.
 ///
 /// # Errors
 /// As with [`run`].
 pub fn run_with(
     bus: &Bus,
     config: &BridgeConfig,
-    open: &Opener,
+    gpio: &dyn Gpio,
     shutdown: &Shutdown,
 ) -> Result<(), BridgeError> {
     let kept = if config.resume {
@@ -116,10 +115,18 @@ pub fn run_with(
     let mut touches: Queue<(Touch, u64), TOUCHES> = Queue::new();
     let (mut touched, touches) = touches.split();
 
+    let listening = Listening::default();
     let server = bus.server::<BridgeRequest>()?;
     let events = [first_out, second_out];
     let loan = Loan::new(bus.home(), bus.unit());
-    let mut service = Service::new(bus, config, (&counts, &loan), kept, events, touches)?;
+    let mut service = Service::new(
+        bus,
+        config,
+        (&counts, &loan, &listening),
+        kept,
+        events,
+        touches,
+    )?;
     let ringer = service.waiter.ringer();
     shutdown.wake(ringer.clone());
     // The word decides whether the robot is stopped. If the state says stopped and the word is
@@ -154,26 +161,30 @@ pub fn run_with(
                 })
                 .inspect_err(|_| end.store(true, Ordering::Release))?;
         }
-        if let Some(config) = &config.buttons {
-            let (ringer, end, resume) = (ringer.clone(), &end, kept.is_some());
-            let watch = move || {
-                buttons::watch(config, open, resume, end, |touch, at_ns| {
-                    // A main loop with so many events waiting hangs, and the supervisor will
-                    // replace it.
-                    let _ = touched.enqueue((touch, at_ns));
-                    ringer.ring();
-                });
-            };
-            std::thread::Builder::new()
-                .name("buttons".to_owned())
-                .spawn_scoped(scope, watch)
-                .map_err(|error| PortError::Thread {
-                    what: "the buttons",
-                    fault: error.into(),
-                })
-                .inspect_err(|_| end.store(true, Ordering::Release))?;
-        }
+        let whether = (&end, &listening);
+        let (of_robot, resume) = (config.buttons.as_ref(), kept.is_some());
+        let mut watch = Some(move || {
+            buttons::watch(of_robot, gpio, resume, whether, |touch, at_ns| {
+                // A main loop with so many events waiting hangs, and the supervisor will replace
+                // it.
+                let _ = touched.enqueue((touch, at_ns));
+                ringer.ring();
+            });
+        });
         while !shutdown.is_requested() {
+            // A robot without buttons needs no thread for them until somebody looks for some.
+            if (config.buttons.is_some() || listening.is_wanted())
+                && let Some(watch) = watch.take()
+            {
+                std::thread::Builder::new()
+                    .name("buttons".to_owned())
+                    .spawn_scoped(scope, watch)
+                    .map_err(|error| PortError::Thread {
+                        what: "the buttons",
+                        fault: error.into(),
+                    })
+                    .inspect_err(|_| end.store(true, Ordering::Release))?;
+            }
             service.turn(&server);
         }
         service.park(&server);
@@ -205,6 +216,7 @@ struct Service<'a> {
     config: &'a BridgeConfig,
     counts: &'a Counts,
     loan: &'a Loan<'a>,
+    listening: &'a Listening,
     looking: Looking,
     waiter: Waiter,
     orders: Subscriber<SteeringCommand>,
@@ -226,7 +238,7 @@ impl<'a> Service<'a> {
     fn new(
         bus: &Bus,
         config: &'a BridgeConfig,
-        (counts, loan): (&'a Counts, &'a Loan<'a>),
+        (counts, loan, listening): (&'a Counts, &'a Loan<'a>, &'a Listening),
         kept: Option<(Health, Duration)>,
         events: [Consumer<'a, Handed>; 2],
         touches: Consumer<'a, (Touch, u64)>,
@@ -259,6 +271,7 @@ impl<'a> Service<'a> {
             config,
             counts,
             loan,
+            listening,
             looking: Looking::default(),
             waiter,
             orders: bus.subscriber()?,
@@ -330,16 +343,15 @@ impl<'a> Service<'a> {
     fn take_touches(&mut self) {
         while let Some((touch, at_ns)) = self.touches.dequeue() {
             let now = self.moment();
-            if touch.is_late(at_ns, now.ns) {
-                let late_ms = at_ns.abs_diff(now.ns) / 1_000_000;
-                tracing::warn!(?touch, "a press came {late_ms} ms late and is not taken");
-                continue;
-            }
-            let kind = match touch {
-                Touch::Reset => self.press_reset(now, at_ns),
-                Touch::Switched(mode) => self.switch(mode),
-                Touch::Toggled => self.switch(self.core.mode().other()),
+            let status = match touch {
+                Touch::Reset => self.logic_status(now.ns),
+                Touch::Switched(_) | Touch::Toggled => None,
             };
+            let buttons = self.config.buttons.as_ref();
+            let starts = buttons.is_some_and(|buttons| buttons.reset_starts);
+            let told = (self.core).touch(now, (touch, at_ns), starts, status.as_ref());
+            self.act();
+            let Some(kind) = told else { continue };
             let input = Input {
                 kind: kind.into(),
                 ..Input::default()
@@ -350,27 +362,6 @@ impl<'a> Service<'a> {
                 self.complain(&error);
             }
         }
-    }
-
-    fn switch(&mut self, mode: Mode) -> InputKind {
-        self.core.switch(mode);
-        match mode {
-            Mode::Manual => InputKind::SwitchedToManual,
-            Mode::Autonomous => InputKind::SwitchedToAutonomous,
-        }
-    }
-
-    fn press_reset(&mut self, now: Moment, at_ns: u64) -> InputKind {
-        let status = self.logic_status(now.ns);
-        let buttons = self.config.buttons.as_ref();
-        let press = ResetPress {
-            at_ns,
-            may_start: buttons.is_some_and(|buttons| buttons.reset_starts),
-            status: status.as_ref(),
-        };
-        let kind = self.core.press_reset(now, &press);
-        self.act();
-        kind
     }
 
     /// The state that logic has published last, unless logic is silent.
@@ -403,7 +394,9 @@ impl<'a> Service<'a> {
     /// Begins to answer one request. The loop turns until a board has answered.
     fn answer(&mut self, ask: &Ask) -> BridgeAnswer {
         let now = self.moment();
+        self.core.hear_lines(self.listening.told());
         self.core.ask(now, ask);
+        self.listening.want(self.core.is_listened_to());
         self.act();
         loop {
             // The answer goes out when its content is in force and published.
@@ -459,6 +452,7 @@ impl<'a> Service<'a> {
         let now = self.moment();
         self.core.decide(now.robot);
         self.act();
+        self.listening.want(self.core.is_listened_to());
         self.meter.turn_over();
         if self.meter.is_due(now.ns) {
             self.publish_latency();

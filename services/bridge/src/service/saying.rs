@@ -55,6 +55,13 @@ impl Service<'_> {
             Notice::Pressed(mode) => tracing::info!(?mode, "the switch was pressed"),
             Notice::Reset(what) => self.think(what),
             Notice::ModeSet(mode) => tracing::info!(?mode, "the mode is set"),
+            Notice::LateTouch(touch, late_ms) => {
+                tracing::warn!(?touch, "a press came {late_ms} ms late and is not taken");
+            }
+            Notice::Listened(true) => tracing::info!(
+                "the robot's buttons do nothing while somebody finds out how they are connected"
+            ),
+            Notice::Listened(false) => tracing::info!("the robot's buttons count again"),
             Notice::Late(kind) => {
                 tracing::warn!(?kind, "a request came too late and is not carried out");
             }

@@ -5,22 +5,27 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
-use lager_bridge::buttons::{BETWEEN_PRESSES, ButtonsConfig, Lines, Movement, SwitchKind};
+use lager_bridge::buttons::{BETWEEN_PRESSES, ButtonsConfig, Gpio, Lines, Movement, Survey};
 use lager_home::Clock;
-use lager_orders::Mode;
+use lager_orders::{Contact, Level, Levels, Mode, SwitchKind};
 use lager_ports::{Cause, Publisher};
 use lager_stop::StopWord;
 use lager_topics::{
-    Health, Input, InputKind, LinkHealth, LogThought, NavStatus, NavigatorStatus, OperatorInput,
-    Phase, Refusal, Role, StopCause, ThoughtKind,
+    Ask, BridgeAnswer, ButtonLines, Health, Input, InputKind, LinkHealth, LogThought, NavStatus,
+    NavigatorStatus, OperatorInput, Outcome, Phase, Refusal, Role, StopCause, ThoughtKind,
 };
 
 use crate::harness::{
     Bridge, FORWARD, Robot, Seen, SensorBoard, SteeringBoard, operator, wait_until,
 };
 
-const RESET: u32 = 5;
-const SWITCH: u32 = 6;
+const RESET: u8 = 5;
+const SWITCH: u8 = 6;
+
+fn contact(line: u8) -> Contact {
+    let closed = Level::Low;
+    Contact { line, closed }
+}
 
 /// Contacts that a test moves. A clone is the same ones.
 #[derive(Clone, Default)]
@@ -29,7 +34,7 @@ struct Contacts(Arc<(Mutex<State>, Condvar)>);
 #[derive(Default)]
 struct State {
     /// The lines whose contacts are closed.
-    closed: Vec<u32>,
+    closed: Vec<u8>,
     /// What has moved and was not told.
     moved: Vec<Movement>,
     /// The chip is gone.
@@ -45,7 +50,7 @@ impl Contacts {
     }
 
     /// Closes or opens the contact at a line, `ago` ns before now.
-    fn moves_late(&self, line: u32, is_closed: bool, ago: u64) {
+    fn moves_late(&self, line: u8, is_closed: bool, ago: u64) {
         self.change(|state| {
             state.closed.retain(|closed| *closed != line);
             state.closed.extend(is_closed.then_some(line));
@@ -57,7 +62,7 @@ impl Contacts {
         });
     }
 
-    fn moves(&self, line: u32, is_closed: bool) {
+    fn moves(&self, line: u8, is_closed: bool) {
         self.moves_late(line, is_closed, 0);
     }
 
@@ -65,7 +70,7 @@ impl Contacts {
         self.0.0.lock().expect("no panic").opened
     }
 
-    fn open(&self) -> io::Result<Box<dyn Lines>> {
+    fn open_them(&self) -> io::Result<Box<dyn Lines>> {
         let mut state = self.0.0.lock().expect("no panic");
         state.opened += 1;
         // What a chip has told nobody is forgotten.
@@ -77,8 +82,35 @@ impl Contacts {
     }
 }
 
+impl Gpio for Contacts {
+    fn open(&self, _: &ButtonsConfig) -> io::Result<Box<dyn Lines + '_>> {
+        self.open_them()
+    }
+
+    fn survey(&self) -> io::Result<Box<dyn Survey + '_>> {
+        match self.0.0.lock().expect("no panic").is_away {
+            true => Err(io::ErrorKind::NotFound.into()),
+            false => Ok(Box::new(self.clone())),
+        }
+    }
+}
+
+impl Survey for Contacts {
+    fn levels(&mut self) -> io::Result<Levels> {
+        let mut levels = Levels::default();
+        for line in &self.0.0.lock().expect("no panic").closed {
+            levels.set(*line, Some(Level::Low));
+        }
+        Ok(levels)
+    }
+
+    fn chip(&self) -> u8 {
+        2
+    }
+}
+
 impl Lines for Contacts {
-    fn is_closed(&self, line: u32) -> io::Result<bool> {
+    fn is_closed(&self, line: u8) -> io::Result<bool> {
         Ok(self.0.0.lock().expect("no panic").closed.contains(&line))
     }
 
@@ -108,8 +140,8 @@ impl Scene {
         let mut robot = Robot::with(SensorBoard::new(), SteeringBoard::new());
         robot.bridge_config.buttons = Some(ButtonsConfig {
             chip: "/dev/none".into(),
-            reset: Some(RESET),
-            switch: Some(SWITCH),
+            reset: Some(contact(RESET)),
+            switch: Some(contact(SWITCH)),
             switch_kind: SwitchKind::Position,
             reset_starts: true,
             debounce: Duration::from_millis(20),
@@ -128,10 +160,9 @@ impl Scene {
     }
 
     fn start_bridge(&mut self) {
-        let contacts = self.contacts.clone();
-        let open = Box::new(move |_: &ButtonsConfig| contacts.open());
+        let contacts = Box::new(self.contacts.clone());
         let config = self.robot.bridge_config.clone();
-        let bridge = Bridge::start_with(&self.robot.isolation, config, open);
+        let bridge = Bridge::start_with(&self.robot.isolation, config, contacts);
         self.robot.bridge = Some(bridge);
     }
 
@@ -367,4 +398,63 @@ fn reset_at_the_delivery_node_ends_the_stop_of_a_fresh_start_and_no_other() {
         (Some(ThoughtKind::ResetKeepsStop), InputKind::ResetPressed)
     );
     stays(&scene);
+}
+
+/// Listens until the lines have been read, and returns the answer.
+fn listens(scene: &Scene) -> BridgeAnswer {
+    let mut answer = BridgeAnswer::default();
+    wait_until("the lines are read", || {
+        answer = scene.robot.hands.ask(Ask::listen());
+        assert_eq!(answer.outcome, Outcome::Done);
+        answer.button_lines != ButtonLines::Unread
+    });
+    answer
+}
+
+#[test]
+fn whoever_finds_out_how_the_buttons_are_connected_sees_their_lines_and_they_do_nothing() {
+    let mut scene = Scene::new();
+    scene.start();
+    assert_eq!(scene.told(), Some(InputKind::SwitchedToManual));
+    let answer = listens(&scene);
+    assert_eq!(
+        (answer.button_lines, answer.button_chip),
+        (ButtonLines::Read.into(), 2)
+    );
+    assert_eq!(answer.levels(), Levels::default());
+    scene.contacts.moves(SWITCH, true);
+    scene.contacts.moves(RESET, true);
+    wait_until("the lines show it", || {
+        let lines = listens(&scene).levels();
+        lines.low == 1 << SWITCH | 1 << RESET && lines.high == 0
+    });
+    // A stop needs no button.
+    scene.robot.hands.stop();
+    scene
+        .robot
+        .hands
+        .wait_for_health("the stop", |health| health.stopped != 0);
+    assert!(scene.inputs.drain().is_empty());
+
+    // He dies. Where the switch stands now is where it stood; its next movement counts.
+    let opened = scene.contacts.opened();
+    wait_until("the buttons are watched again", || {
+        scene.contacts.opened() > opened
+    });
+    // Then their positions are read.
+    std::thread::sleep(Duration::from_nanos(BETWEEN_PRESSES));
+    scene.contacts.moves(RESET, false);
+    scene.contacts.moves(SWITCH, false);
+    assert_eq!(scene.told(), Some(InputKind::SwitchedToManual));
+    scene.contacts.moves(SWITCH, true);
+    assert_eq!(scene.told(), Some(InputKind::SwitchedToAutonomous));
+}
+
+#[test]
+fn a_robot_without_lines_for_buttons_says_so() {
+    let mut scene = Scene::new();
+    scene.robot.bridge_config.buttons = None;
+    scene.contacts.change(|state| state.is_away = true);
+    scene.start();
+    assert_eq!(listens(&scene).button_lines, ButtonLines::Absent);
 }

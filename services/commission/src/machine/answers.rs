@@ -116,6 +116,13 @@ impl Commissioning {
                 self.state = State::Over;
             }
             (Question::Finish, Answer::No) => self.quit(now),
+            (
+                Question::ButtonsFree
+                | Question::ResetButton
+                | Question::ModeSwitch
+                | Question::SwitchAutonomous,
+                _,
+            ) => return self.buttons_answered(now, answer),
             // A person who says no to a movement, or not yet, is asked again.
             _ => return self.arm_answered(now, answer),
         }

@@ -50,6 +50,7 @@ impl Commissioning {
                     [("low", &volts(low)), ("high", &volts(high))];
                 Said::new("live_battery", &values)
             }),
+            (_, Step::Buttons) => self.buttons_shown().unwrap_or_else(none),
             (_, Step::Boards | Step::Finish) => {
                 let health = self.health.map(|(_, health)| health).unwrap_or_default();
                 let board = |board: lager_topics::BoardHealth| match board.up {

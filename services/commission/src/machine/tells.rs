@@ -14,7 +14,44 @@ const RETRY: Duration = Duration::from_millis(200);
 /// The parts of the description that are found out.
 pub(super) const TOLD: [Part; 3] = Part::ALL;
 
+/// The thresholds of the line sensors, which their board keeps. They come back before the parts of
+/// the description, one request after the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Thresholds {
+    /// Nothing has changed them, or they are back.
+    #[default]
+    Former,
+    /// A calibration has.
+    New,
+    /// They are to come back.
+    Due,
+    /// The bridge was asked for that.
+    Asked,
+}
+
 impl Commissioning {
+    /// The thresholds come back with what is told next.
+    pub(super) fn take_thresholds_back(&mut self) {
+        if self.thresholds == Thresholds::New {
+            self.thresholds = Thresholds::Due;
+            self.is_tried = true;
+        }
+    }
+
+    /// To be called with the bridge's answer to [`Effect::Uncalibrate`]; `None` if there was none.
+    pub fn uncalibrated(&mut self, now: Moment, outcome: Option<Outcome>) {
+        self.thresholds = match outcome {
+            Some(Outcome::Done) => Thresholds::Former,
+            // Its board has another program, and never will.
+            Some(Outcome::Refused) => {
+                self.said.push("thresholds_stay".into());
+                Thresholds::Former
+            }
+            _ => Thresholds::Due,
+        };
+        self.tells_on(now, self.thresholds == Thresholds::Former);
+    }
+
     /// The arm that the steering board obeys.
     pub(super) fn told_arm(&self) -> Option<ArmProfile> {
         self.told[Part::Arm as usize].map(|told| told.arm)
@@ -27,6 +64,11 @@ impl Commissioning {
         if let Some(told) = self.told.get_mut(part as usize) {
             *told = asked.filter(|_| is_told);
         }
+        self.tells_on(now, is_told);
+    }
+
+    /// Goes on to tell, after a while if the last request was in vain.
+    fn tells_on(&mut self, now: Moment, is_told: bool) {
         let State::Tells { since, .. } = self.state else {
             return;
         };
@@ -50,7 +92,13 @@ impl Commissioning {
 
     /// Tells the next part that a board does not obey yet, one at a time.
     pub(super) fn tell_next(&mut self, since: Duration) {
-        if self.under_way.is_some() {
+        if self.under_way.is_some() || self.thresholds == Thresholds::Asked {
+            self.state = State::Tells { since, due: None };
+            return;
+        }
+        if self.thresholds == Thresholds::Due {
+            self.thresholds = Thresholds::Asked;
+            self.effects.push(Effect::Uncalibrate);
             self.state = State::Tells { since, due: None };
             return;
         }
@@ -83,7 +131,13 @@ impl Commissioning {
     pub(super) fn undescribed(&mut self, now: Moment) {
         self.told = [None; TOLD.len()];
         self.under_way = None;
+        if self.thresholds == Thresholds::Asked {
+            self.thresholds = Thresholds::Due;
+        }
         if self.is_leaving {
+            if self.has_calibrated() {
+                self.said.push("thresholds_stay".into());
+            }
             self.said.push("undescribed".into());
             self.state = State::Over;
         } else {

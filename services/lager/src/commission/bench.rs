@@ -10,11 +10,11 @@ use anyhow::Result;
 use lager_commission::{Answer, Built, Commissioning, Effect, Question, Said, Step, Takes};
 use lager_home::Clock;
 use lager_orders::Moment;
-use lager_ports::{Bus, Subscriber};
+use lager_ports::{Bus, Cause, Publisher, Subscriber};
 use lager_supervisor::hands::Hands;
 use lager_topics::{
-    Ask, AskKind, BridgeAnswer, LinkHealth, Outcome, Part, SensorDistance, SensorLine,
-    SteeringState,
+    Ask, AskKind, BridgeAnswer, LinkHealth, LogThought, Outcome, Part, Role, SensorDistance,
+    SensorLine, SteeringState, Thought, ThoughtKind,
 };
 use lager_wire::RobotProfile;
 
@@ -33,6 +33,7 @@ pub struct Bench {
     health: Subscriber<LinkHealth>,
     line: Subscriber<SensorLine>,
     distance: Subscriber<SensorDistance>,
+    thoughts: Publisher<LogThought>,
     state: Subscriber<SteeringState>,
     /// What decides everything.
     pub machine: Commissioning,
@@ -57,6 +58,7 @@ impl Bench {
             health: bus.subscriber()?,
             line: bus.subscriber()?,
             distance: bus.subscriber()?,
+            thoughts: bus.publisher()?,
             state: bus.subscriber()?,
             bus,
             machine: Commissioning::new(built),
@@ -155,6 +157,14 @@ impl Bench {
                     }
                     self.machine.described(self.now(), part, outcome);
                 }
+                Effect::Uncalibrate => {
+                    let outcome = outcome(self.hands.ask(uncalibrate()));
+                    self.machine.uncalibrated(self.now(), outcome);
+                }
+                Effect::Listen => {
+                    let answer = self.hands.ask(Ask::listen()).ok();
+                    self.machine.lines(self.now(), answer.as_ref());
+                }
                 Effect::Calibrate => {
                     let outcome = outcome(self.hands.ask(Ask {
                         kind: AskKind::Calibrate.into(),
@@ -185,8 +195,17 @@ impl Bench {
         }
     }
 
-    /// The boards go on to obey what was saved until the robot is started again.
-    pub fn settle(&mut self, built: &Built) {
+    /// The boards go on to obey what was saved until the robot is started again, and the log says who
+    /// has saved it.
+    pub fn settle(&mut self, built: &Built, kind: ThoughtKind) {
+        let thought = Thought {
+            from: Role::Operator.into(),
+            seen: i32::try_from(rustix::process::getuid().as_raw()).unwrap_or(-1),
+            ..kind.into()
+        };
+        if let Err(error) = self.thoughts.send(Cause::OWN, thought) {
+            tracing::warn!("the log does not say who has set the robot up: {error}");
+        }
         for (part, _) in self.trials.into_iter().flatten() {
             let _ = self.hands.ask(Ask::describe(part, &built.robot));
         }
@@ -203,6 +222,14 @@ impl Bench {
             robot: self.bus.clock().now(),
             ns: Clock::monotonic_ns(),
         }
+    }
+}
+
+/// The request to have the former thresholds of the line sensors back.
+pub fn uncalibrate() -> Ask {
+    Ask {
+        kind: AskKind::Uncalibrate.into(),
+        ..Ask::default()
     }
 }
 

@@ -28,6 +28,7 @@ use lager_lines::{Name, Text, to_line};
 use lager_orders::lease::{LATEST_MOVE, TooLate};
 use lager_orders::{Action, Commission, Reason};
 use lager_supervisor::console;
+use lager_topics::ThoughtKind;
 use lager_wake::Shutdown;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
@@ -65,7 +66,7 @@ fn commission(configured: &Config, is_undo: bool, shutdown: &Shutdown) -> Result
     // comm has the configuration of the robot that runs, with its description.
     let robot = Robot::new(&configured.undescribed()?)?;
     if is_undo {
-        return robot.undo();
+        return robot.undo(shutdown);
     }
     let (mut bench, patience) = robot.bench(shutdown)?;
     let Some(built) = converse(&mut bench, &patience, shutdown)? else {
@@ -83,9 +84,9 @@ fn commission(configured: &Config, is_undo: bool, shutdown: &Shutdown) -> Result
             text: Text::new(*line)?,
         }))?;
     }
-    let path = robot.keep(&new)?;
+    let path = robot.keep(&new, &bench)?;
     patience.watchdog.enter("waiting for the robot");
-    bench.settle(&built);
+    bench.settle(&built, ThoughtKind::SetUpAtPage);
     Ok(Said::kept(&path))
 }
 

@@ -177,8 +177,8 @@ fn lines_of<'a>(values: &'a str, section: &str) -> impl Iterator<Item = &'a str>
 mod tests {
     use super::super::{Body, Waiting};
     use super::*;
-    use lager_bridge::buttons::SwitchKind;
     use lager_comm::LinkLost;
+    use lager_orders::{Level, SwitchKind};
     use lager_wire::{ArmLimits, IrModel, JointLimits, JointServos, OneOrTwo, ReversedJoints};
 
     #[test]
@@ -269,6 +269,8 @@ mod tests {
                 reset: Some(5),
                 switch: Some(6),
                 switch_kind: SwitchKind::Press,
+                reset_closed: Level::High,
+                switch_closed: Level::High,
                 reset_starts: false,
                 debounce_ms: 30,
             },

@@ -96,6 +96,7 @@ impl Config {
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
             reach_shoulder: self.logic.reach_shoulder,
             reach_elbow: self.logic.reach_elbow,
+            buttons: self.buttons.commissioned(),
         }
     }
 
@@ -114,15 +115,17 @@ impl Config {
         self.logic.cruise_mm_per_s = built.cruise_mm_per_s;
         self.logic.reach_shoulder = built.reach_shoulder;
         self.logic.reach_elbow = built.reach_elbow;
+        self.buttons.take_commissioned(&built.buttons);
     }
 
     /// Writes how this robot is built into its file, whose earlier text
     /// [`Config::forget_description`] brings back. `configured` is what the configuration says
-    /// without that file. Returns the file.
+    /// without that file; `has_calibrated`, whether the line sensors have other thresholds than
+    /// before. Returns the file.
     ///
     /// # Errors
     /// The configuration would contradict the file, or the disk refuses it; then the old text stays.
-    pub fn keep_description(&self, configured: &Self) -> Result<PathBuf> {
+    pub fn keep_description(&self, configured: &Self, has_calibrated: bool) -> Result<PathBuf> {
         self.validate()?;
         let path = self.place_of_description()?;
         let text = self.described();
@@ -136,17 +139,21 @@ impl Config {
             true => files::read(&path).with_context(write)?,
             false => String::new(),
         };
+        let (_, before) = uncalibrated(&before);
+        let mark = if has_calibrated { CALIBRATED } else { "" };
+        let before = format!("{mark}{before}");
         files::replace(&before_of(&path), &before).with_context(write)?;
         files::replace(&path, &text).with_context(write)?;
         Ok(path)
     }
 
     /// Puts back the description before the last [`Config::keep_description`]. Doing it twice
-    /// changes nothing. Returns the file.
+    /// changes nothing. Returns the file, and whether the line sensors' thresholds are to come back,
+    /// too ([`Config::forget_calibration`]).
     ///
     /// # Errors
     /// No description was kept before, or the disk refuses it.
-    pub fn forget_description(&self) -> Result<PathBuf> {
+    pub fn forget_description(&self) -> Result<(PathBuf, bool)> {
         let path = self.place_of_description()?;
         let kept = before_of(&path);
         if !kept.exists() {
@@ -157,12 +164,24 @@ impl Config {
         }
         let write = || format!("cannot go back to {}", kept.display());
         let before = files::read(&kept).with_context(write)?;
+        let (has_calibrated, before) = uncalibrated(&before);
         match before.is_empty() {
             true if !path.exists() => {}
             true => fs::remove_file(&path).with_context(write)?,
-            false => files::replace(&path, &before).with_context(write)?,
+            false => files::replace(&path, before).with_context(write)?,
         }
-        Ok(path)
+        Ok((path, has_calibrated))
+    }
+
+    /// The line sensors have the thresholds again from before the last [`Config::keep_description`].
+    ///
+    /// # Errors
+    /// The disk refuses to note that.
+    pub fn forget_calibration(&self) -> Result<()> {
+        let kept = before_of(&self.place_of_description()?);
+        let write = || format!("cannot write {}", kept.display());
+        let before = files::read(&kept).with_context(write)?;
+        files::replace(&kept, uncalibrated(&before).1).with_context(write)
     }
 
     /// The same without what the robot's file says. Of a section that stands in both files nobody
@@ -274,6 +293,17 @@ impl Config {
             true => "as the simulated robot".to_owned(),
             false => differs.join(", "),
         }
+    }
+}
+
+/// The first line of a former description after which the line sensors were calibrated.
+const CALIBRATED: &str = "# After this the line sensors were calibrated.\n";
+
+/// Whether they were, and the description.
+fn uncalibrated(before: &str) -> (bool, &str) {
+    match before.strip_prefix(CALIBRATED) {
+        Some(rest) => (true, rest),
+        None => (false, before),
     }
 }
 
@@ -487,13 +517,22 @@ mod tests {
         for turn in [9_000, 9_500] {
             let mut new = configured.clone();
             new.wheels.full_turn_ms = turn;
-            assert_eq!(new.keep_description(&configured).expect("kept"), place);
+            assert_eq!(
+                new.keep_description(&configured, true).expect("kept"),
+                place
+            );
             assert_eq!(read().expect("valid"), turn);
         }
         for _ in 0..2 {
-            configured.forget_description().expect("there is one");
+            let (_, has_calibrated) = configured.forget_description().expect("there is one");
+            assert!(has_calibrated, "until that is taken back, too");
             assert_eq!(read().expect("valid"), 9_000);
         }
+
+        configured.forget_calibration().expect("written");
+        let (_, has_calibrated) = configured.forget_description().expect("there is one");
+        assert!(!has_calibrated);
+        assert_eq!(read().expect("valid"), 9_000);
 
         let contradicts = Config {
             wheels: WheelsProfile {
@@ -502,12 +541,16 @@ mod tests {
             },
             ..configured.clone()
         };
-        let told = configured.keep_description(&contradicts).expect_err("two");
+        let told = configured
+            .keep_description(&contradicts, true)
+            .expect_err("two");
         assert!(told.to_string().contains("take it out of one"), "{told}");
         assert_eq!(read().expect("as before"), 9_000);
 
         let simulated = Config::default();
-        let told = simulated.keep_description(&simulated).expect_err("no file");
+        let told = simulated
+            .keep_description(&simulated, false)
+            .expect_err("no file");
         assert!(told.to_string().contains("robot = \"FILE\""), "{told}");
     }
 
@@ -518,7 +561,9 @@ mod tests {
             robot: Some(folder.0.join("robot.toml")),
             ..Config::default()
         };
-        let path = configured.keep_description(&configured).expect("kept");
+        let path = configured
+            .keep_description(&configured, true)
+            .expect("kept");
         configured.forget_description().expect("taken back");
         assert!(!path.exists());
     }

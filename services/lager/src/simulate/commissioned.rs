@@ -1,6 +1,7 @@
 //! Robots that nobody has described are commissioned by a person who answers from what he sees, and
 //! deliver afterwards. Before that they fail, and say why.
 
+mod buttons;
 mod person;
 
 use std::time::Duration;
@@ -51,7 +52,9 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers() {
             "seed {seed}"
         );
         assert_arm(&built.robot.arm, &build, seed);
+        assert_eq!(built.buttons, buttons::of(&build.buttons), "seed {seed}");
         let mut whole = restarted(person, &built, seed);
+        buttons::act_as_they_are_built(&mut whole, &built, seed);
         let limit = whole.now + LIMIT;
         assert_eq!(whole.run(limit), None, "seed {seed}: {build:?} {built:?}");
         assert_eq!(whole.robot.world().collisions(), 0, "seed {seed}");

@@ -30,7 +30,7 @@ const OF_EVENT = {
 /** @type {Partial<Record<string, Kind>>} */
 const OF_WISH = {
   stop: "stop", resume: "stop", order: "goods", cancel: "goods", first: "goods", up: "goods", clear: "goods", back: "goods", picked: "goods",
-  obstacle: "ways", gains: "settings", calibrate: "settings", restart: "settings", pick: "settings", warehouse: "settings",
+  obstacle: "ways", commission: "settings", gains: "settings", calibrate: "settings", restart: "settings", pick: "settings", warehouse: "settings",
 };
 /**
  * How the kinds of thoughts begin; all others are of the way.
@@ -42,7 +42,7 @@ const OF_THOUGHT = [
   [/^(order|queue|goods|all_goods|fetching|picking|has_goods|delivered)/, "goods"],
   [/^(board|blind|sees_again|link|joint|parked_without_link)/, "link"],
   [/^(battery|parked)/, "battery"],
-  [/^(map|picks)/, "settings"],
+  [/^(map|picks|set_up)/, "settings"],
   [/^(started_by_reset|reset_)/, "stop"],
   [/^(no_such|put_|arm_|honks)/, "persons"],
 ];
@@ -120,5 +120,5 @@ function asked([name = "", what = "", first = "", ...more]) {
   };
   // What takes no words is called as its button is.
   if (plain().includes(what)) return `${who}: ${[sentence(`do_${what}`), first].filter(Boolean).join(" ")}`;
-  return say(`did_${what}${["obstacle", "pick"].includes(what) ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
+  return say(`did_${what}${["commission", "obstacle", "pick"].includes(what) ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
 }

@@ -95,21 +95,21 @@ pub(crate) struct Bridge {
 
 impl Bridge {
     pub(crate) fn start(isolation: &Isolation, config: BridgeConfig) -> Self {
-        Self::start_with(isolation, config, Box::new(buttons::open))
+        Self::start_with(isolation, config, Box::new(buttons::Chips))
     }
 
-    /// Where `open` has the lines of its buttons.
+    /// Where `gpio` has the lines of its buttons.
     pub(crate) fn start_with(
         isolation: &Isolation,
         config: BridgeConfig,
-        open: Box<buttons::Opener>,
+        gpio: Box<dyn buttons::Gpio + Send>,
     ) -> Self {
         let bus = isolation.open(Role::Bridge);
         let shutdown = Shutdown::new();
         let wish = shutdown.clone();
         let thread = std::thread::Builder::new()
             .name("bridge".to_owned())
-            .spawn(move || lager_bridge::run_with(&bus, &config, &*open, &wish))
+            .spawn(move || lager_bridge::run_with(&bus, &config, &*gpio, &wish))
             .unwrap();
         Self {
             shutdown,

@@ -6,8 +6,8 @@ use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
 use lager_commission::{Answer, Built, Commissioning, Effect, Joint, Question, Step, Takes, Way};
-use lager_orders::{Language, Mode, Moment};
-use lager_plant::{Build, Pose};
+use lager_orders::{Language, Mode, Moment, SwitchKind};
+use lager_plant::{Build, ButtonsBuild, Pose};
 use lager_stop::Stop;
 use lager_supervisor::mission::{Helper, Mission, Watch};
 use lager_topics::{Ask, AskKind, BridgeAnswer, Part, Role, StopCause};
@@ -15,6 +15,8 @@ use lager_wire::{ArmPose, ArmProfile, SERVO_MAX};
 
 use super::super::Whole;
 use super::super::built::robot;
+use super::buttons;
+use crate::commission::uncalibrate;
 use crate::config::Config;
 
 /// Virtual time in which a robot must be commissioned.
@@ -33,6 +35,8 @@ const PRESS: Duration = Duration::from_millis(1_000);
 const LEAST: u16 = 64;
 /// Where the arm rests when a person lays it down.
 const LYING: u16 = 300;
+/// How long he takes to reach a button of the robot; he presses it for twice as long.
+const TOUCH: Duration = Duration::from_millis(120);
 /// How far he moves the line sensors to either side, in mm, and in how many seconds to and fro.
 const SWAY: (f64, f64) = (60.0, 1.6);
 /// Where the line sensors are over bare floor, and where the robot has room to turn.
@@ -57,6 +61,8 @@ pub(in crate::simulate) struct Wizard {
 enum Asked {
     Part(Part),
     Calibration,
+    Thresholds,
+    Lines,
 }
 
 impl Deref for Wizard {
@@ -86,6 +92,8 @@ impl Whole {
         self.with_wizard(|wizard, now| match wizard.asked.take() {
             Some(Asked::Part(part)) => wizard.described(now, part, outcome),
             Some(Asked::Calibration) => wizard.calibrates(now, outcome),
+            Some(Asked::Thresholds) => wizard.uncalibrated(now, outcome),
+            Some(Asked::Lines) => wizard.lines(now, Some(answer)),
             None => {}
         });
     }
@@ -178,6 +186,8 @@ impl Person {
                     continue;
                 }
                 Effect::Describe(part, robot) => (Asked::Part(part), Ask::describe(part, &robot)),
+                Effect::Uncalibrate => (Asked::Thresholds, uncalibrate()),
+                Effect::Listen => (Asked::Lines, Ask::listen()),
                 Effect::Calibrate => {
                     let kind = AskKind::Calibrate.into();
                     let ask = Ask {
@@ -188,6 +198,8 @@ impl Person {
                 }
             };
             self.whole.wizard.as_mut().expect("one").asked = Some(asked);
+            let told = buttons::told(self.whole.robot.world());
+            self.whole.bridge.hear_lines(told);
             self.whole.ask(&ask);
         }
         for said in self.machine().said() {
@@ -213,6 +225,7 @@ impl Person {
         if question.takes() == Takes::Hold {
             return self.press(question);
         }
+        self.touch(question, now.saturating_sub(since));
         let pose = self.whole.robot.world().pose();
         let is_there = match question {
             Question::TurnRound => pose.heading - self.begun.heading >= TAU,
@@ -289,9 +302,25 @@ impl Person {
             Question::PoseCarry => pose(drawn.carry),
             Question::PoseDrop => pose(drawn.drop),
             Question::PoseNeutral => pose(drawn.neutral),
+            Question::ButtonsFree => (0..2).for_each(|button| world.press(button, false)),
             Question::Finish => world.fill_claw(false),
             _ => {}
         }
+    }
+
+    /// Presses a button of the robot for a moment, or moves its switch, if it has that.
+    fn touch(&mut self, question: Question, since: Duration) {
+        let buttons = self.build.buttons;
+        let (button, is_back) = match question {
+            Question::ResetButton if buttons.reset.is_some() => (0, true),
+            Question::ModeSwitch => match buttons.mode {
+                Some((_, kind)) => (1, kind == SwitchKind::Press),
+                None => return,
+            },
+            _ => return,
+        };
+        let is_closed = since >= TOUCH && (since < TOUCH * 3 || !is_back);
+        self.whole.robot.world_mut().press(button, is_closed);
     }
 
     /// Holds the button until what moves stands, lets it go, and answers when everything was seen.
@@ -362,6 +391,9 @@ impl Person {
                 Answer::Number(self.whole.robot.world().battery_volts() as f32)
             }
             Question::Battery => Answer::No,
+            Question::ButtonsFree if self.build.buttons == ButtonsBuild::default() => Answer::No,
+            Question::ResetButton if self.build.buttons.reset.is_none() => Answer::No,
+            Question::ModeSwitch if self.build.buttons.mode.is_none() => Answer::No,
             Question::Speed => Answer::Number((DRIVE / 10.0) as f32),
             _ => Answer::Yes,
         }
