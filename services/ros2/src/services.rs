@@ -422,7 +422,8 @@ fn carry_out(lager: &[OsString], job: &Job) -> TriggerResponse {
 /// What a command has said, as one line.
 fn said(output: &[u8]) -> String {
     let text = String::from_utf8_lossy(output);
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let lines = text.lines().map(|line| line.trim().trim_start_matches("lager: "));
+    let lines = lines.filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join("; ")
 }
 
