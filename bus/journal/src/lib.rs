@@ -67,6 +67,6 @@ pub use ordered::{Ordered, Placed, Selection, Step};
 pub use overview::{Overview, OverviewReader, Scan, TopicOverview};
 pub use read::{Part, ReadError};
 pub use recover::{Recovered, Recovery};
-pub use scene::{Kind, Scene, Shown, View};
+pub use scene::{Kind, Scene, Shown, View, drawn, shapes};
 pub use walk::{Damage, Learnt, Message, Topic, Visit, Walk};
 pub use write::{Channel, Journal, Start, Times, WriteError};

@@ -40,6 +40,7 @@
 mod error;
 mod mapping;
 mod page;
+mod verdict;
 mod watching;
 
 use core::fmt;
@@ -56,6 +57,7 @@ use lager_topics::{Role, StopCause};
 
 pub use error::StopError;
 pub use page::{Release, StopPage};
+pub use verdict::{Verdict, judge, process_state, span};
 
 /// The file's size in bytes.
 pub(crate) const SIZE: u64 = 4096;

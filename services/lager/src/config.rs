@@ -44,7 +44,7 @@ use serde::{Deserialize, Serialize};
 pub use battery::BatterySection;
 pub use bus::{BusSection, Waiting};
 pub use buttons::ButtonsSection;
-pub use chip::ChipSection;
+pub use chip::{ChipSection, program_near};
 pub use documented::flag;
 pub use gateway::{GatewaySection, ZenohSection};
 pub use logic::LogicSection;

@@ -28,6 +28,7 @@ mod overload;
 mod reach;
 mod realtime;
 mod report;
+mod ros2;
 mod shell;
 mod sigbus;
 mod simulate;
@@ -243,6 +244,9 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         Command::Station(args) => {
             station::run(&config, &args, &shutdown)?;
             return Ok(ExitCode::SUCCESS);
+        }
+        Command::Gateway(args) if args.ros2 => {
+            return Err(ros2::become_it(&config, &args, &cli.global)?);
         }
         Command::Gateway(args) => {
             let (running, wanted) = gateway::prepare(&config, &args)?;

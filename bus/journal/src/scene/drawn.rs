@@ -15,11 +15,11 @@ use super::shapes::{
 };
 
 /// The frame of the warehouse.
-const MAP: &str = "map";
+pub const MAP: &str = "map";
 /// The frame of the robot, its origin on the floor below the middle of the axle, x ahead.
-const ROBOT: &str = "robot";
+pub const ROBOT: &str = "robot";
 /// The same, at the place where the navigator believes the robot to be.
-const NAVIGATOR: &str = "navigator";
+pub const NAVIGATOR: &str = "navigator";
 
 /// The tape's width, in m.
 const TAPE_M: f64 = 0.02;
@@ -35,12 +35,12 @@ const INFO: u8 = 2;
 const WARNING: u8 = 3;
 
 /// The side of a square in m; 0 = not known.
-pub(super) fn side_m(map: &WarehouseMap) -> f64 {
+pub fn side_m(map: &WarehouseMap) -> f64 {
     f64::from(map.side_length_cm) / 100.0
 }
 
 /// The warehouse: tape, places of goods, and where they are delivered.
-pub(super) fn map(map: &WarehouseMap, time: Time) -> SceneUpdate {
+pub fn map(map: &WarehouseMap, time: Time) -> SceneUpdate {
     let side = side_m(map);
     let (width, height) = (f64::from(map.width) * side, f64::from(map.height) * side);
     let mut tape = Vec::new();
@@ -83,7 +83,7 @@ pub(super) fn map(map: &WarehouseMap, time: Time) -> SceneUpdate {
 }
 
 /// The ways that are blocked, as the robot knows them.
-pub(super) fn blocks(ways: &BlockedWays, map: &WarehouseMap, time: Time) -> SceneUpdate {
+pub fn blocks(ways: &BlockedWays, map: &WarehouseMap, time: Time) -> SceneUpdate {
     let side = side_m(map);
     let mut entity = Entity::new(MAP, "blocks", time);
     for way in ways.ways() {
@@ -102,7 +102,7 @@ pub(super) fn blocks(ways: &BlockedWays, map: &WarehouseMap, time: Time) -> Scen
 }
 
 /// Goods and things on the floor, where they really are.
-pub(super) fn world(truth: &Truth, side: f64, time: Time) -> SceneUpdate {
+pub fn world(truth: &Truth, side: f64, time: Time) -> SceneUpdate {
     let mut entity = Entity::new(MAP, "world", time);
     for good in truth.goods() {
         let [x, y, z] = [good.x_mm, good.y_mm, good.z_mm].map(|mm| f64::from(mm) / 1000.0);
@@ -131,7 +131,7 @@ pub(super) fn world(truth: &Truth, side: f64, time: Time) -> SceneUpdate {
 }
 
 /// A body in each of the robot's frames.
-pub(super) fn bodies(time: Time) -> SceneUpdate {
+pub fn bodies(time: Time) -> SceneUpdate {
     let body = |frame: &'static str, id: &'static str, color: Color| {
         let mut entity = Entity::new(frame, id, time);
         entity.cubes.push(Cube {
@@ -171,7 +171,7 @@ pub(super) fn believed_frame(pose: Believed, time: Time) -> FrameTransform {
 }
 
 /// A service's thought. A failure, and everything that makes the robot wait, is a warning.
-pub(super) fn log(thought: &Thought, time: Time) -> Log {
+pub fn log(thought: &Thought, time: Time) -> Log {
     let is_failure = thought.failure.kind.get() != Some(FailureKind::None);
     let is_warning = is_failure
         || matches!(
@@ -212,12 +212,14 @@ fn moved(frame: &'static str, pose: Pose, time: Time) -> FrameTransform {
     }
 }
 
-fn truth_pose(truth: &Truth) -> Pose {
+/// Where the robot really is.
+pub fn truth_pose(truth: &Truth) -> Pose {
     let place = at(truth.x_mm / 1000.0, truth.y_mm / 1000.0, 0.0);
     Pose::new(place, truth.heading_rad)
 }
 
-fn believed_pose(pose: Believed) -> Pose {
+/// Where the navigator believes the robot to be.
+pub fn believed_pose(pose: Believed) -> Pose {
     let place = at(
         f64::from(pose.x_mm) / 1000.0,
         f64::from(pose.y_mm) / 1000.0,

@@ -19,9 +19,9 @@
 //!
 //! Lengths are in m. `map` has its origin at node (0, 0), x to the right and y up.
 
-mod drawn;
+pub mod drawn;
 mod schema;
-mod shapes;
+pub mod shapes;
 
 use lager_sample::Topic;
 use lager_topics::{

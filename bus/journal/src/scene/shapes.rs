@@ -6,13 +6,16 @@ use serde::Serialize;
 
 /// A moment since 1970.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Time {
-    sec: u64,
-    nsec: u64,
+pub struct Time {
+    /// Seconds.
+    pub sec: u64,
+    /// The rest in ns.
+    pub nsec: u64,
 }
 
 impl Time {
-    pub(super) const fn of_ns(unix_ns: u64) -> Self {
+    /// That many ns since 1970.
+    pub const fn of_ns(unix_ns: u64) -> Self {
         Self {
             sec: unix_ns / 1_000_000_000,
             nsec: unix_ns % 1_000_000_000,
@@ -20,23 +23,33 @@ impl Time {
     }
 }
 
+/// A place, or lengths along the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Vector3 {
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) z: f64,
+pub struct Vector3 {
+    /// To the right, or ahead.
+    pub x: f64,
+    /// Up on the map, or to the left.
+    pub y: f64,
+    /// Off the floor.
+    pub z: f64,
 }
 
-pub(super) const fn at(x: f64, y: f64, z: f64) -> Vector3 {
+/// A place.
+pub const fn at(x: f64, y: f64, z: f64) -> Vector3 {
     Vector3 { x, y, z }
 }
 
+/// A rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Quaternion {
-    x: f64,
-    y: f64,
-    z: f64,
-    w: f64,
+pub struct Quaternion {
+    /// Of the axis; 0 here, as everything turns about the vertical.
+    pub x: f64,
+    /// Of the axis; 0 here.
+    pub y: f64,
+    /// The sine of half the angle.
+    pub z: f64,
+    /// The cosine of half the angle.
+    pub w: f64,
 }
 
 impl Quaternion {
@@ -52,14 +65,18 @@ impl Quaternion {
     }
 }
 
+/// A place and a direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Pose {
-    pub(super) position: Vector3,
-    pub(super) orientation: Quaternion,
+pub struct Pose {
+    /// The place.
+    pub position: Vector3,
+    /// The direction.
+    pub orientation: Quaternion,
 }
 
 impl Pose {
-    pub(super) fn new(position: Vector3, angle: f64) -> Self {
+    /// The pose at `position`, turned by `angle` about the vertical.
+    pub fn new(position: Vector3, angle: f64) -> Self {
         let orientation = Quaternion::turned(angle);
         Self {
             position,
@@ -68,12 +85,17 @@ impl Pose {
     }
 }
 
+/// A colour, each part from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Color {
-    r: f64,
-    g: f64,
-    b: f64,
-    a: f64,
+pub struct Color {
+    /// Red.
+    pub r: f64,
+    /// Green.
+    pub g: f64,
+    /// Blue.
+    pub b: f64,
+    /// 0 is clear.
+    pub a: f64,
 }
 
 impl Color {
@@ -94,33 +116,47 @@ impl Color {
     }
 }
 
+/// A box.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Cube {
-    pub(super) pose: Pose,
-    pub(super) size: Vector3,
-    pub(super) color: Color,
+pub struct Cube {
+    /// Its middle.
+    pub pose: Pose,
+    /// Its sides.
+    pub size: Vector3,
+    /// Its colour.
+    pub color: Color,
 }
 
+/// An arrow along x.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Arrow {
-    pub(super) pose: Pose,
-    pub(super) shaft_length: f64,
-    pub(super) shaft_diameter: f64,
-    pub(super) head_length: f64,
-    pub(super) head_diameter: f64,
-    pub(super) color: Color,
+pub struct Arrow {
+    /// Its foot.
+    pub pose: Pose,
+    /// Without the head.
+    pub shaft_length: f64,
+    /// How thick it is.
+    pub shaft_diameter: f64,
+    /// Of the head alone.
+    pub head_length: f64,
+    /// How thick the head is.
+    pub head_diameter: f64,
+    /// Its colour.
+    pub color: Color,
 }
 
 /// Separate lines: each two points are the ends of one.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Lines {
+pub struct Lines {
     #[serde(rename = "type")]
     kind: u8,
     pose: Pose,
-    thickness: f64,
+    /// How thick the lines are.
+    pub thickness: f64,
     scale_invariant: bool,
-    points: Vec<Vector3>,
-    color: Color,
+    /// The ends, two for each line.
+    pub points: Vec<Vector3>,
+    /// Their colour.
+    pub color: Color,
     colors: [Color; 0],
     indices: [u32; 0],
 }
@@ -142,14 +178,19 @@ impl Lines {
     }
 }
 
+/// A text that turns to whoever looks.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Label {
-    pose: Pose,
+pub struct Label {
+    /// Where it stands.
+    pub pose: Pose,
     billboard: bool,
-    font_size: f64,
+    /// The height of its letters.
+    pub font_size: f64,
     scale_invariant: bool,
-    color: Color,
-    text: String,
+    /// Its colour.
+    pub color: Color,
+    /// The text.
+    pub text: String,
 }
 
 impl Label {
@@ -174,21 +215,27 @@ struct Lifetime {
 
 /// Shapes that belong together. They replace earlier shapes with the same id.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Entity {
+pub struct Entity {
     timestamp: Time,
-    frame_id: &'static str,
-    id: &'static str,
+    /// The frame of its coordinates.
+    pub frame_id: &'static str,
+    /// Its name.
+    pub id: &'static str,
     /// 0 is for ever.
     lifetime: Lifetime,
     frame_locked: bool,
     metadata: [(); 0],
-    pub(super) arrows: Vec<Arrow>,
-    pub(super) cubes: Vec<Cube>,
+    /// Arrows.
+    pub arrows: Vec<Arrow>,
+    /// Boxes.
+    pub cubes: Vec<Cube>,
     spheres: [(); 0],
     cylinders: [(); 0],
-    pub(super) lines: Vec<Lines>,
+    /// Lines.
+    pub lines: Vec<Lines>,
     triangles: [(); 0],
-    pub(super) texts: Vec<Label>,
+    /// Texts.
+    pub texts: Vec<Label>,
     models: [(); 0],
 }
 
@@ -214,10 +261,12 @@ impl Entity {
     }
 }
 
+/// Shapes to be shown in place of earlier ones with the same ids.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct SceneUpdate {
+pub struct SceneUpdate {
     deletions: [(); 0],
-    entities: Vec<Entity>,
+    /// The shapes.
+    pub entities: Vec<Entity>,
 }
 
 impl SceneUpdate {
@@ -251,12 +300,19 @@ pub(super) struct FrameTransform {
     pub(super) rotation: Quaternion,
 }
 
+/// A line of a log.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Log {
-    pub(super) timestamp: Time,
-    pub(super) level: u8,
-    pub(super) message: String,
-    pub(super) name: &'static str,
-    pub(super) file: &'static str,
-    pub(super) line: u32,
+pub struct Log {
+    /// When it was said.
+    pub timestamp: Time,
+    /// 2 tells, 3 warns.
+    pub level: u8,
+    /// The sentence.
+    pub message: String,
+    /// Who says it.
+    pub name: &'static str,
+    /// Empty: it is not said of a program's text.
+    pub file: &'static str,
+    /// 0.
+    pub line: u32,
 }
