@@ -366,15 +366,30 @@ fn the_package_is_typed_and_a_wrong_field_is_found() {
 #[ignore = "needs LAGER_PYTHON, a Python with matplotlib; tests/run makes one"]
 fn what_was_measured_is_drawn() {
     let domain = Domain::new();
-    let [report, picture] = ["hop.json", "hop.svg"].map(|name| domain.folder().join(name));
-    let row = json!({"name": "lager", "mode": "block", "regime": "plain", "what": "hop",
-        "p50_ns": 4_100, "p999_ns": 9_300});
-    let told = json!({"machine": "two cores", "rows": [row]});
-    std::fs::write(&report, told.to_string()).expect("a file");
-    let mut plot = python();
-    plot.arg(in_tree("benches/plot"));
-    let said = plot.args([&report, &picture]).output().expect("it starts");
-    let said = String::from_utf8_lossy(&said.stderr);
-    let drawn = std::fs::read_to_string(picture).unwrap_or_else(|_| panic!("{said}"));
-    assert!(drawn.contains("</svg>"), "{said}");
+    let row = json!({"name": "lager", "mode": "block", "regime": "plain", "what": "hop", "n": 2_000,
+        "p50_ns": 4_100, "p90_ns": 5_000, "p99_ns": 9_300, "p999_ns": null, "p9999_ns": null,
+        "p99999_ns": null, "max_ns": 20_000});
+    let report = json!({"machine": "two cores", "rows": [row.clone()]});
+    let saved = json!({"layout": 1, "machine": {"processor": "two cores"}, "rows": [row]});
+    for (name, measured, words) in [
+        ("bars", report, "median"),
+        ("curves", saved, "one sample in so many"),
+    ] {
+        let [file, picture] =
+            ["json", "svg"].map(|end| domain.folder().join(name).with_extension(end));
+        std::fs::write(&file, measured.to_string()).expect("a file");
+        let mut plot = python();
+        // Text stays text in the picture.
+        plot.env("MPLCONFIGDIR", domain.folder());
+        std::fs::write(domain.folder().join("matplotlibrc"), "svg.fonttype: none\n")
+            .expect("a file");
+        plot.arg(in_tree("benches/plot"));
+        let said = plot.args([&file, &picture]).output().expect("it starts");
+        let said = String::from_utf8_lossy(&said.stderr);
+        let drawn = std::fs::read_to_string(picture).unwrap_or_else(|_| panic!("{said}"));
+        assert!(
+            drawn.contains("</svg>") && drawn.contains(words),
+            "{name}: {said}"
+        );
+    }
 }

@@ -376,6 +376,24 @@ mod tests {
     }
 
     #[test]
+    fn slower_and_broken_have_exit_codes_of_their_own() {
+        let ended = |result| format!("{:?}", super::ended("compare", result));
+        let judged = |fails: bool| {
+            let code = ExitCode::from(u8::from(fails));
+            ended(Ok((String::new(), code)))
+        };
+        let unreadable = compare(
+            [&"none.json".into(), &"none.json".into()],
+            1.03,
+            false,
+            true,
+        );
+        let codes = [judged(false), judged(true), ended(unreadable)];
+        let expected = [0, 1, NO_RESULT].map(|code| format!("{:?}", ExitCode::from(code)));
+        assert_eq!(codes, expected);
+    }
+
+    #[test]
     fn wrong_choices_say_what_there_is() {
         for (flags, words) in [
             (
