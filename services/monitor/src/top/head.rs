@@ -23,9 +23,10 @@ pub struct Load {
 
 /// A process of the robot that stands still.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Failing {
+pub struct Failing {
     /// Its role, or its name on the command line.
     pub(crate) who: String,
+    /// Its process; 0 if it is on another machine.
     pub(crate) pid: u32,
     /// How long it has given no sign of life; `None` if it is frozen.
     pub(crate) silent: Option<Duration>,
@@ -36,6 +37,10 @@ impl Failing {
     pub(crate) fn said(&self) -> String {
         let (who, pid) = (called(&self.who), self.pid);
         match self.silent {
+            Some(long) if pid == 0 => format!(
+                "nothing has come from the robot's {who} for {}; all below is as old",
+                span(long)
+            ),
             None => {
                 format!("the {who}, process {pid}, is frozen; `kill -CONT {pid}` lets it go on")
             }

@@ -120,6 +120,7 @@ fn head(model: &Model, page: &mut Page<'_>) {
     let now = model.now_ns;
     let of = match &model.file {
         Some(file) => format!("of {file}"),
+        None if head.load.cores == 0 => "from afar".to_owned(),
         None => format!(
             "load {:.2} on {}",
             head.load.minute,

@@ -20,7 +20,7 @@ const SILENT_NS: u64 = 10_000_000_000;
 
 /// Whether a process that writes a topic runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Life {
+pub enum Life {
     /// It wrote a recording; nobody checks it any more.
     Recorded,
     /// It runs.
