@@ -20,7 +20,7 @@
 //!
 //! In place of the bus, the figures and views can be those of a robot elsewhere, from its own gateway.
 //!
-//! It never writes to the bus, and nobody waits for it. A request gets the figures of the last
+//! It never writes to the bus: what it reads is a [`Place`], which has no writers. Nobody waits for it. A request gets the figures of the last
 //! poll. The listener reads every sample; if it has missed some, a figure says so.
 
 #![forbid(unsafe_code)]
@@ -42,9 +42,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lager_home::UnitName;
-use lager_ports::{Bus, IntrospectError, Place, PlaceError, PortError, ReceiveError};
+use lager_ports::{IntrospectError, Place, PlaceError, PortError, ReceiveError};
 use lager_remote::Settings;
-use lager_stop::StopPage;
 use lager_wake::{Shutdown, Watchdog};
 use tokio::runtime::Runtime;
 
@@ -233,34 +232,14 @@ impl Gateway {
         &self.at
     }
 
-    /// Reads the robot of `bus` and answers until `shutdown` is requested.
+    /// Reads the robot at `place`, its bus or its gateway elsewhere, and answers until `shutdown` is
+    /// requested. `stop_word` is where the robot's stop word lies, if it is here.
+    ///
+    /// A place has no writers, so nothing in this crate could write to a bus.
     ///
     /// # Errors
-    /// The bus cannot be read any more, or the system does not let it run.
+    /// The robot cannot be read any more, or the system does not let it run.
     pub fn run(
-        self,
-        bus: &Bus,
-        watchdog: &Watchdog,
-        shutdown: &Shutdown,
-    ) -> Result<(), GatewayError> {
-        let stop_word = bus.home().folder_of(bus.unit()).join(StopPage::FILE);
-        self.run_at(bus, Some(stop_word), watchdog, shutdown)
-    }
-
-    /// The same for a robot elsewhere, whose stop word nobody can read here.
-    ///
-    /// # Errors
-    /// As [`Gateway::run`].
-    pub fn run_from_afar(
-        self,
-        place: &impl Place,
-        watchdog: &Watchdog,
-        shutdown: &Shutdown,
-    ) -> Result<(), GatewayError> {
-        self.run_at(place, None, watchdog, shutdown)
-    }
-
-    fn run_at(
         self,
         place: &impl Place,
         stop_word: Option<PathBuf>,
