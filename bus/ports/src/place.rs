@@ -216,7 +216,10 @@ mod tests {
     fn an_error_of_the_bus_is_known_among_those_of_any_place() {
         let topic = "a/b".to_owned();
         let error = PlaceError::of(PortError::OtherVersion { topic });
-        assert!(matches!(error, PlaceError::Open(PortError::OtherVersion { .. })));
+        assert!(matches!(
+            error,
+            PlaceError::Open(PortError::OtherVersion { .. })
+        ));
         let error = PlaceError::of(std::io::Error::other("no link"));
         assert_eq!(error.to_string(), "no link");
         assert!(matches!(error, PlaceError::Elsewhere(_)));

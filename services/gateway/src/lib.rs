@@ -260,7 +260,8 @@ impl Gateway {
                     .spawn_scoped(scope, move || http::serve(runtime, metrics, shared, over))?
             };
             let is_over = || served.is_finished();
-            let listened = listener::listen(place, watchdog, shutdown, &shared, self.shown, is_over);
+            let listened =
+                listener::listen(place, watchdog, shutdown, &shared, self.shown, is_over);
             over.store(true, Ordering::Relaxed);
             let served = served.join().expect("the server does not panic");
             listened?;

@@ -7,12 +7,12 @@ use lager_wake::Shutdown;
 use crate::config::Config;
 use crate::exit;
 
-/// A robot elsewhere, as a place where samples come from.
-#[cfg(feature = "zenoh")]
-pub use lager_remote::Remote;
 /// This program can call none, so there is never one.
 #[cfg(not(feature = "zenoh"))]
 pub use lager_ports::Bus as Remote;
+/// A robot elsewhere, as a place where samples come from.
+#[cfg(feature = "zenoh")]
+pub use lager_remote::Remote;
 
 /// Connects to the gateway of the robot that the configuration names.
 ///

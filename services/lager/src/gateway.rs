@@ -34,7 +34,9 @@ pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, Addresses
         joined.chip.clock = running.chip.clock;
     }
     let configured = &joined.gateway;
-    let zenoh = configured.zenoh.settings(args.zenoh.clone(), args.via.clone());
+    let zenoh = configured
+        .zenoh
+        .settings(args.zenoh.clone(), args.via.clone());
     let mut wanted = Addresses {
         metrics: args.metrics.or(configured.metrics),
         foxglove: args.foxglove.or(configured.foxglove),
@@ -105,10 +107,14 @@ pub fn route(config: &Config, args: &GatewayArgs, shutdown: &Shutdown) -> Result
         router: None,
         ..config.gateway.zenoh.clone()
     };
-    let settings = zenoh.settings(Some(endpoint.clone()), None).map_err(usage)?;
+    let settings = zenoh
+        .settings(Some(endpoint.clone()), None)
+        .map_err(usage)?;
     let proof = settings.and_then(|settings| settings.proof);
     let _router = lager_remote::Router::open(endpoint, &args.robots, proof.as_ref())?;
-    console::print(&format!("robots and listeners with Zenoh connect to {endpoint}"))?;
+    console::print(&format!(
+        "robots and listeners with Zenoh connect to {endpoint}"
+    ))?;
     while !shutdown.is_requested() {
         std::thread::sleep(LOOK);
     }

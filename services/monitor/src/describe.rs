@@ -95,7 +95,10 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
             .over("looking at the topic", || self.place.every_topic());
         let topics = topics.map_err(Into::into)?;
         let live = topics.into_iter().find(|topic| topic.name == name);
-        if live.as_ref().is_some_and(|live| live.layout == Layout::Described) {
+        if live
+            .as_ref()
+            .is_some_and(|live| live.layout == Layout::Described)
+        {
             // The robot is of another build.
             return self.info_of_found(name);
         }

@@ -20,6 +20,7 @@ mod delay;
 mod describe;
 mod durations;
 mod echo;
+mod life;
 mod measure;
 mod origin;
 mod publish;
@@ -40,11 +41,12 @@ use lager_topics::UnknownTopic;
 use lager_wake::{Shutdown, Watchdog};
 
 pub use echo::EchoConfig;
+pub use life::{Failing, Life};
 pub use measure::Limits;
 pub use origin::Origin;
 pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
-pub use top::{Failing, Lacking, Life, Load, Recorded, TopConfig, leave_screen};
+pub use top::{Lacking, Load, Recorded, TopConfig, leave_screen};
 
 /// How often `topic echo` and `top` look.
 const POLL: Duration = Duration::from_millis(5);

@@ -7,7 +7,7 @@ use lager_ports::{Bus, NodeInfo, NodeState, Place};
 use lager_stop::{Stop, StopPage, StopWord};
 
 use crate::ToolError;
-use crate::top::{Failing, Life};
+use crate::life::{Failing, Life};
 
 /// The services that write a sign of life, because nothing on the bus shows that they live.
 const SIGNING: [&str; 3] = ["comm", "station", "gateway"];

@@ -199,7 +199,9 @@ fn called_at(
     host: &str,
     addresses: &[String],
 ) -> Result<CertificateParams, CertificateError> {
-    let mut names = [host, "localhost", "127.0.0.1", "::1"].map(str::to_owned).to_vec();
+    let mut names = [host, "localhost", "127.0.0.1", "::1"]
+        .map(str::to_owned)
+        .to_vec();
     for address in addresses {
         if !names.contains(address) {
             names.push(address.clone());

@@ -81,12 +81,21 @@ mod tests {
         assert_eq!(clocks.offset(2 * S).expect("an offset").ns, first.ns);
         // A faster one tells more.
         clocks.exchange(3 * S, 13 * S + 1_000, 3 * S + 2_000);
-        assert_eq!(clocks.offset(3 * S + 2_000).expect("an offset").unsure_ns, 1_001);
+        assert_eq!(
+            clocks.offset(3 * S + 2_000).expect("an offset").unsure_ns,
+            1_001
+        );
         let old = clocks.offset(103 * S).expect("an offset");
         assert!(old.unsure_ns > 15_000_000, "{old:?}");
         // By then the slow one is the better one.
         clocks.exchange(103 * S, 113 * S, 103 * S + 10_000_000);
-        assert_eq!(clocks.offset(103 * S + 10_000_000).expect("an offset").unsure_ns, 5_000_001);
+        assert_eq!(
+            clocks
+                .offset(103 * S + 10_000_000)
+                .expect("an offset")
+                .unsure_ns,
+            5_000_001
+        );
     }
 
     #[test]

@@ -78,7 +78,13 @@ impl Keys {
 
     /// All of these, for rules of access.
     pub(crate) fn all(&self) -> [String; 5] {
-        [self.topics(), self.layouts(), self.counts(), self.alive(), self.time()]
+        [
+            self.topics(),
+            self.layouts(),
+            self.counts(),
+            self.alive(),
+            self.time(),
+        ]
     }
 
     /// The topic of a key that [`Keys::topic`] has made; `None` for other keys.

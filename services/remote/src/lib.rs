@@ -32,6 +32,8 @@ mod causes;
 #[cfg(feature = "zenoh")]
 mod certificates;
 #[cfg(feature = "zenoh")]
+mod error;
+#[cfg(feature = "zenoh")]
 mod listener;
 #[cfg(feature = "zenoh")]
 mod place;
@@ -53,6 +55,8 @@ pub use causes::causes;
 pub use certificates::{AUTHORITY, CertificateError, Holder, Made, make};
 pub use clocks::{Clocks, Offset};
 pub use endpoint::{Endpoint, EndpointError, HostPort, USUAL_ZENOH};
+#[cfg(feature = "zenoh")]
+pub use error::RemoteError;
 pub use key::{Keys, is_carried};
 pub use ledger::{Account, Heard, Ledger};
 pub use limit::{Limit, Verdict};
@@ -60,7 +64,7 @@ pub use limit::{Limit, Verdict};
 pub use listener::Listening;
 pub use note::{Counts, Note, NoteError, layout_number};
 #[cfg(feature = "zenoh")]
-pub use remote::{Hub, Remote, RemoteError};
+pub use remote::{Hub, Remote};
 #[cfg(feature = "zenoh")]
 pub use robot::{Carrier, CarrierError, may_be_had};
 #[cfg(feature = "zenoh")]

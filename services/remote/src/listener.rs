@@ -21,17 +21,15 @@ use zenoh::query::{ConsolidationMode, Reply};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
+use crate::error::{LARGEST, PATIENCE, RemoteError};
 use crate::key::Keys;
 use crate::ledger::{Account, Heard, Ledger};
 use crate::note::{Note, layout_number};
-use crate::remote::{PATIENCE, RemoteError};
 use crate::session::ZenohError;
 use crate::told::{About, Beat};
 
 /// How many messages of a topic wait for the caller.
 const QUEUE: usize = 4_096;
-/// The largest payload that is read, in bytes. The largest of the robot's table is far smaller.
-pub(crate) const LARGEST: usize = 16 << 20;
 
 fn subscribe(
     session: &Session,

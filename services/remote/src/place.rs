@@ -8,8 +8,9 @@ use lager_ports::{Layout, Peer, Place, StampTime, TopicInfo, Watched};
 use lager_sample::{Description, Make, Topic};
 use lager_topics::LAGER;
 
+use crate::error::RemoteError;
 use crate::listener::Listening;
-use crate::remote::{Remote, RemoteError};
+use crate::remote::Remote;
 use crate::told::About;
 use crate::typed::Typed;
 

@@ -9,14 +9,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_home::{Clock, UnitName};
 use lager_ports::StampTime;
-use lager_sample::DescriptionError;
 use lager_wake::Shutdown;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
@@ -27,14 +25,13 @@ use zenoh::{Session, Wait};
 use crate::causes;
 use crate::clocks::{Clocks, Offset};
 use crate::endpoint::Endpoint;
+use crate::error::{PATIENCE, RemoteError};
 use crate::key::{EVERY_ALIVE, Keys, alive_of};
-use crate::listener::{LARGEST, Listening, bytes, telling};
+use crate::listener::{Listening, bytes, telling};
 use crate::session::{self, ZenohError};
 use crate::settings::Proof;
 use crate::told::{About, Beat, Time, boot};
 
-/// How long a gateway has for an answer.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(3);
 /// How long the other end has to answer the call.
 const CALLED: Duration = Duration::from_secs(5);
 /// How often a call looks whether somebody ends it.
@@ -47,82 +44,6 @@ const TRIPS: usize = 5;
 const TRIP: Duration = Duration::from_secs(1);
 /// How many messages wait for the thread. Another beat comes soon.
 const QUEUE: usize = 16;
-
-/// Why nothing can be heard of a robot.
-#[derive(Debug, thiserror::Error)]
-pub enum RemoteError {
-    /// TLS needs certificates.
-    #[error(
-        "{0} needs certificates; name authority, certificate and key of this listener in \
-         [gateway.zenoh], as `lager keys` makes them"
-    )]
-    NoProof(Endpoint),
-    /// A file of the certificates cannot be read.
-    #[error("cannot read {file}: {error}; `lager keys` makes it")]
-    Proof {
-        /// Which.
-        file: PathBuf,
-        /// Why.
-        error: std::io::Error,
-    },
-    /// There is no connection.
-    #[error(
-        "no connection to {endpoint}: {cause}; `lager gateway --zenoh ENDPOINT` on the robot says \
-         where it listens"
-    )]
-    Connect {
-        /// Where.
-        endpoint: Endpoint,
-        /// Why, in Zenoh's words if it has told no more.
-        cause: String,
-    },
-    /// The gateway is there and says nothing of this robot.
-    #[error(
-        "no gateway of the robot `{robot}` answers at {endpoint}: another robot is there, or its \
-         certificate is not that of `{robot}`; --name chooses another robot"
-    )]
-    Silent {
-        /// Which robot.
-        robot: UnitName,
-        /// Where.
-        endpoint: Endpoint,
-    },
-    /// The gateway does not carry the topic.
-    #[error("`{topic}` is not sent by the gateway of `{robot}`; it sends {}", .carried.join(", "))]
-    NotCarried {
-        /// Which.
-        topic: String,
-        /// Of which robot.
-        robot: UnitName,
-        /// What it carries.
-        carried: Vec<String>,
-    },
-    /// The layout is none.
-    #[error("`{topic}`: {error}")]
-    Layout {
-        /// Of which topic.
-        topic: String,
-        /// Why.
-        error: DescriptionError,
-    },
-    /// A payload would be too large.
-    #[error("`{topic}` has payloads of {bytes} bytes, more than {LARGEST}, and is not read")]
-    TooLarge {
-        /// Which.
-        topic: String,
-        /// How large.
-        bytes: usize,
-    },
-    /// Zenoh cannot.
-    #[error("Zenoh cannot: {0}")]
-    Zenoh(#[from] ZenohError),
-    /// The system gives no thread.
-    #[error("no thread can be started for the gateway: {0}")]
-    Thread(std::io::Error),
-    /// Somebody has ended it.
-    #[error("interrupted")]
-    Ended,
-}
 
 /// A connection to a robot's gateway.
 #[derive(Debug)]
@@ -183,7 +104,9 @@ impl Now {
             let real = Duration::from_nanos(at_ns.saturating_sub(then_ns)).as_secs_f64();
             let pace = robot.saturating_sub(then).as_secs_f64() / real;
             // Neither of a new gateway nor of a clock that stands still.
-            self.pace = Some(pace).filter(|pace| pace.is_finite() && *pace > 0.0).or(self.pace);
+            self.pace = Some(pace)
+                .filter(|pace| pace.is_finite() && *pace > 0.0)
+                .or(self.pace);
         }
         self.robot_time = Some((at_ns, robot));
     }
@@ -395,7 +318,10 @@ impl Asker {
             now.take_robot_time(beat.now_ns, Duration::from_nanos(beat.robot_ns));
             if std::mem::take(&mut now.is_lost) && !now.is_quiet {
                 let silent = silent.map_or(0.0, |heard| heard.elapsed().as_secs_f64());
-                tracing::warn!("the gateway of `{}` is heard again, after {silent:.1} s", self.robot);
+                tracing::warn!(
+                    "the gateway of `{}` is heard again, after {silent:.1} s",
+                    self.robot
+                );
             }
             now.version != version
         };

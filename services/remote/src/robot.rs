@@ -84,9 +84,12 @@ pub enum CarrierError {
         file: PathBuf,
         /// What it names.
         named: String,
-        /// The robot, or the router.
+        /// The robot.
         robot: String,
     },
+    /// The certificate is not a router's.
+    #[error("{0} is no router's certificate; `lager keys router` makes one")]
+    NoRouter(PathBuf),
     /// The certificate holds no more, or not yet.
     #[error(
         "{0} has expired, or is not valid yet by this machine's clock; `lager keys` makes another"
@@ -304,7 +307,10 @@ impl Carrier {
         let config = session::of_robot(settings);
         let ways = [&settings.endpoint, &settings.router].into_iter().flatten();
         let failed = |error| CarrierError::Zenoh {
-            endpoint: ways.map(Endpoint::to_string).collect::<Vec<_>>().join(" and "),
+            endpoint: ways
+                .map(Endpoint::to_string)
+                .collect::<Vec<_>>()
+                .join(" and "),
             error,
         };
         let session = match session::open(&config) {

@@ -26,7 +26,10 @@ impl Router {
         proof: Option<&Proof>,
     ) -> Result<Self, CarrierError> {
         if let (Endpoint::Tls(_), Some(proof)) = (endpoint, proof) {
-            proves(proof, session::ROUTER)?;
+            proves(proof, session::ROUTER).map_err(|error| match error {
+                CarrierError::OtherRobot { file, .. } => CarrierError::NoRouter(file),
+                error => error,
+            })?;
         }
         may_listen(endpoint)?;
         let config = session::of_router(endpoint, robots, proof);

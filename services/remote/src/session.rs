@@ -79,7 +79,11 @@ pub(crate) fn of_router(endpoint: &Endpoint, robots: &[UnitName], proof: Option<
     let anybody = Subject {
         name: "anybody",
         names: None,
-        ingress: if is_proved { &[&ASKS] } else { &[&ASKS, &TELLS] },
+        ingress: if is_proved {
+            &[&ASKS]
+        } else {
+            &[&ASKS, &TELLS]
+        },
         egress: &[&ASKS, &TELLS],
         keys: keys_of_all(),
     };

@@ -53,8 +53,7 @@ pub fn run(
                 console::complain(&Speaker::Tool.line(&format!("{robot}: {news}")));
             }
         };
-        let recorded =
-            lager_recorder::record(&remote, &watchdog, shutdown, &config, &mut tell)?;
+        let recorded = lager_recorder::record(&remote, &watchdog, shutdown, &config, &mut tell)?;
         sum_up(robot, &recorded, as_json)?;
         recorded.ended_by.map_or(Ok(()), |error| Err(error.into()))
     };
@@ -76,10 +75,12 @@ pub fn run(
                 let recording = thread.spawn_scoped(scope, || one(remote));
                 recordings.push((robot, recording.context("cannot start a thread")?));
             }
-            patience.pause(LOOK).or_else(|error| match error.is::<exit::Interrupted>() {
-                true => Ok(()),
-                false => Err(error),
-            })?;
+            patience
+                .pause(LOOK)
+                .or_else(|error| match error.is::<exit::Interrupted>() {
+                    true => Ok(()),
+                    false => Err(error),
+                })?;
         }
         let mut is_whole = true;
         for (robot, recording) in recordings {
@@ -89,7 +90,11 @@ pub fn run(
                 is_whole = false;
             }
         }
-        Ok(if is_whole { ExitCode::SUCCESS } else { exit::FAILED })
+        Ok(if is_whole {
+            ExitCode::SUCCESS
+        } else {
+            exit::FAILED
+        })
     })
 }
 

@@ -92,7 +92,12 @@ pub struct RecordArgs {
     #[arg(long)]
     pub wait: bool,
     /// Record a robot on another computer, at this endpoint of its `lager gateway --zenoh`
-    #[arg(long, value_name = "ENDPOINT", conflicts_with = "wait", help_heading = "Robot")]
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        conflicts_with = "wait",
+        help_heading = "Robot"
+    )]
     pub remote: Option<Endpoint>,
     /// Record every robot whose gateway is at that endpoint of a `lager gateway --router`, also those
     /// that come later

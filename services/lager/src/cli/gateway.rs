@@ -53,7 +53,13 @@ pub struct GatewayArgs {
     #[arg(long, value_name = "ENDPOINT", num_args = 0..=1, default_missing_value = USUAL_ZENOH, conflicts_with_all = ["metrics", "foxglove", "zenoh", "via", "remote"], help_heading = "Router")]
     pub router: Option<Endpoint>,
     /// The robots that a router with certificates lets tell of themselves; all others only listen
-    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "router", help_heading = "Router")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_delimiter = ',',
+        requires = "router",
+        help_heading = "Router"
+    )]
     pub robots: Vec<UnitName>,
     /// What `up` tells every service
     #[command(flatten)]

@@ -36,6 +36,11 @@ pub struct TopArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "duration")]
     pub bag: Option<PathBuf>,
     /// Look at a robot on another computer, at this endpoint of its `lager gateway --zenoh`
-    #[arg(long, value_name = "ENDPOINT", conflicts_with = "bag", help_heading = "Robot")]
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        conflicts_with = "bag",
+        help_heading = "Robot"
+    )]
     pub remote: Option<Endpoint>,
 }

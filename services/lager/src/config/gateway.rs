@@ -57,7 +57,9 @@ section! {
 impl GatewaySection {
     /// Whether `up` starts a gateway.
     pub fn is_wanted(&self) -> bool {
-        let ZenohSection { endpoint, router, .. } = &self.zenoh;
+        let ZenohSection {
+            endpoint, router, ..
+        } = &self.zenoh;
         let has_zenoh = endpoint.is_some() || router.is_some();
         self.metrics.is_some() || self.foxglove.is_some() || has_zenoh
     }

@@ -17,8 +17,8 @@ use lager_wake::Watchdog;
 
 use super::head::Load;
 use super::model::Model;
-use super::row::Life;
 use crate::ToolError;
+use crate::life::Life;
 use crate::origin::Origin;
 use crate::source::Stamped;
 
@@ -82,7 +82,10 @@ impl<'a, P: Origin> Feed<'a, P> {
     pub(crate) fn look(&mut self, model: &mut Model) -> Result<(), ToolError> {
         let place = self.place;
         let is_other = place.has_changed(&mut self.watch);
-        let ends = self.ends.take().filter(|ends| !is_other && ends.are_there(place));
+        let ends = self
+            .ends
+            .take()
+            .filter(|ends| !is_other && ends.are_there(place));
         let ends = match ends {
             Some(ends) => ends,
             // On the bus this keeps a core busy for tens of milliseconds, which the robot's path
@@ -165,7 +168,10 @@ impl<'a, P: Origin> Feed<'a, P> {
             head.queue = Some(queue);
         }
         if let Some((_, report)) = last::<SteeringState>(&mut self.report)? {
-            let robot = self.place.unit_time().map_or(Duration::ZERO, |(_, now)| now);
+            let robot = self
+                .place
+                .unit_time()
+                .map_or(Duration::ZERO, |(_, now)| now);
             head.battery.read(robot, report.battery_decivolts);
             head.battery_decivolts = report.battery_decivolts;
         }

@@ -34,9 +34,8 @@ use serde::de::IntoDeserializer;
 use serde_json::{Value, json};
 
 use self::feed::Feed;
-pub use self::head::{Failing, Load};
+pub use self::head::Load;
 use self::model::{Key, Model, Pressed};
-pub use self::row::Life;
 use crate::origin::Origin;
 use crate::{POLL, ToolError, Tools};
 

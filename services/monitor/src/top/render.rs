@@ -12,9 +12,10 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 
-use super::head::{shares, span};
+use super::head::shares;
 use super::model::{Model, Sort};
-use super::row::{Life, Row, Trouble};
+use super::row::{Row, Trouble};
+use crate::life::{Life, span};
 
 /// From this height on, each stage of the path has a line.
 const ROOMY: u16 = 40;
