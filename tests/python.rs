@@ -287,6 +287,78 @@ fn python_reads_a_topic_that_is_in_no_table() {
 }
 
 #[test]
+#[ignore = "needs LAGER_PYTHON, a Python with bus/python[remote]; tests/run makes one"]
+#[cfg(feature = "zenoh")]
+fn python_reads_a_robot_elsewhere_by_its_gateway_as_it_reads_the_bus() {
+    let domain = Domain::new();
+    for args in [
+        ["keys", "authority"].as_slice(),
+        &["keys", "robot", "r1"],
+        &["keys", "listener", "py"],
+    ] {
+        domain.done(args);
+    }
+    let keys = domain.folder().join("keys");
+    let file = |name: &str| keys.join(name).display().to_string();
+    let tls = format!("tls/{}", lager_tests::free());
+    let config = domain.folder().join("robot.toml");
+    let text = format!(
+        "[gateway.zenoh]\nauthority = {:?}\ncertificate = {:?}\nkey = {:?}\n",
+        file("authority.pem"),
+        file("r1.pem"),
+        file("r1.key")
+    );
+    std::fs::write(&config, text).expect("a file");
+    let proof = [file("authority.pem"), file("py.pem"), file("py.key")];
+    let up = domain.start(&["up", "--headless", "--no-station"]);
+    let bus = Bus::open(&domain.bus("r1", 1.0), Role::Guest).expect("the bus opens");
+    let publisher = bus.publisher::<WeatherNow>().expect("a publisher");
+    let config = config.display().to_string();
+    for (endpoint, proof) in [
+        (format!("tcp/{}", lager_tests::free()), &[][..]),
+        (tls, &proof[..]),
+    ] {
+        let gateway = domain.start(&["--config", &config, "gateway", "--zenoh", &endpoint]);
+        lager_tests::wait_for("the gateway", || {
+            let listed = ["--config", &config, "topic", "list", "--remote", &endpoint];
+            let listed = domain.run(&listed);
+            let text = String::from_utf8_lossy(&listed.stdout).into_owned();
+            text.contains("weather/now").then_some(())
+        });
+        let mut reader = python()
+            .arg(program("remote.py"))
+            .arg(&endpoint)
+            .args(proof)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("Python starts");
+        let mut told = BufReader::new(reader.stdout.take().expect("it is piped")).lines();
+        let ready = told.next().expect("a line").expect("it speaks UTF-8");
+        assert_eq!(ready, r#"{"ready": true}"#);
+        let mut wind = 0;
+        let ended = lager_tests::wait_for("the program's end", || {
+            let weather = Weather {
+                wind,
+                from: 90,
+                sky: Sky::Fog.into(),
+                gusts: [0, wind + 1, 0, 0],
+                ..Weather::default()
+            };
+            publisher.send(Cause::OWN, weather).expect("it is sent");
+            wind += 1;
+            std::thread::sleep(Duration::from_millis(5));
+            reader.try_wait().expect("a child")
+        });
+        assert!(ended.success(), "at {endpoint}");
+        let said = told.next().expect("a line").expect("it speaks UTF-8");
+        assert!(said.contains("\"map\": ["), "{said}");
+        drop(gateway);
+    }
+    drop((publisher, bus, up));
+    domain.assert_clean();
+}
+
+#[test]
 #[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
 fn without_a_folder_python_finds_the_bus_that_lager_would() {
     let usual = BusConfig::of(&LAGER).home().expect("this user's folder");

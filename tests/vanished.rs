@@ -11,6 +11,8 @@
 //! of the machine's own network. Not every machine allows that, so these tests are ignored by
 //! default. `tests/run` runs them where the machine allows it; run elsewhere, they fail.
 
+#[cfg(feature = "zenoh")]
+mod bad_link;
 #[path = "comm/scene.rs"]
 #[allow(dead_code, reason = "what other tests with a played station need")]
 mod scene;

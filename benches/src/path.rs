@@ -15,10 +15,14 @@
 //! | `path` | `lager/block` | `floor` |
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
 //! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
+//! | `path@remote` | `lager/8 listeners` | `lager/alone`; all SCHED_FIFO; only with the feature `zenoh` |
 //! | `path-overtaken` | frames of each `lager` row whose command was overtaken | |
 //!
 //! An observer is a process on an iceoryx2 node of its own. It subscribes to `sensor/line` and
 //! `steering/command`, and ten times a second it reads all that has come.
+//!
+//! A listener is a process that gets every sample of every topic over Zenoh, from a gateway of the
+//! robot in a process of its own, as from a network.
 //!
 //! **Cores**: the boards, the bridge and the floor's ends are bound to the first core, logic and
 //! the floor's middle to the second. In the regime of one core, all are bound to that core.
@@ -51,29 +55,54 @@ const TURNS: [usize; 2] = [4, 8];
 const SERVICES: u8 = 40;
 const BOARDS: u8 = 50;
 
-/// The rows, each with its number of observers.
-type Rows = [(Entry, usize); 3];
+/// The rows, each with those who are beside the path.
+type Rows = [(Entry, Beside); 3];
+
+/// Who else gets the samples of a robot, each in a process of its own.
+#[derive(Clone, Copy, Debug)]
+enum Beside {
+    /// Only the services of the path.
+    Nobody,
+    /// So many observers on the bus.
+    Observers(usize),
+    /// A gateway, and so many listeners of it.
+    #[cfg(feature = "zenoh")]
+    Listeners(usize),
+}
 
 /// The rows without observers.
 static ALONE: Rows = [
-    (Entry::new("lager/block", Mode::Block, &["floor"]), 0),
-    (Entry::new("floor", Mode::Block, &[]), 0),
+    (
+        Entry::new("lager/block", Mode::Block, &["floor"]),
+        Beside::Nobody,
+    ),
+    (Entry::new("floor", Mode::Block, &[]), Beside::Nobody),
     (
         Entry::new("lager/adaptive", Mode::Adaptive, &["lager/block", "floor"]),
-        0,
+        Beside::Nobody,
     ),
 ];
 
 /// The rows with and without observers, in real time.
 static OBSERVED: Rows = [
-    (Entry::new("lager/alone", Mode::Block, &[]), 0),
+    (Entry::new("lager/alone", Mode::Block, &[]), Beside::Nobody),
     (
         Entry::new("lager/8 observers", Mode::Block, &["lager/alone"]),
-        8,
+        Beside::Observers(8),
     ),
     (
         Entry::new("lager/64 observers", Mode::Block, &["lager/alone"]),
-        64,
+        Beside::Observers(64),
+    ),
+];
+
+/// The rows with and without listeners on other computers, in real time.
+#[cfg(feature = "zenoh")]
+static REMOTE: [(Entry, Beside); 2] = [
+    (Entry::new("lager/alone", Mode::Block, &[]), Beside::Nobody),
+    (
+        Entry::new("lager/8 listeners", Mode::Block, &["lager/alone"]),
+        Beside::Listeners(8),
     ),
 ];
 
@@ -81,7 +110,7 @@ static OBSERVED: Rows = [
 /// need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     let cores = options.cores;
-    let group = |what: &str, rows: &'static [(Entry, usize)], observed: bool| Group {
+    let group = |what: &str, rows: &'static [(Entry, Beside)], observed: bool| Group {
         what: what.to_owned(),
         regime,
         entries: rows.iter().map(|(entry, _)| *entry).collect(),
@@ -105,6 +134,8 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     }
     if wants(Mode::Block) && regime != Regime::SameCore {
         groups.push(group("path@observed", &OBSERVED, true));
+        #[cfg(feature = "zenoh")]
+        groups.push(group("path@remote", &REMOTE, true));
     }
     groups
 }
@@ -122,7 +153,7 @@ impl Chains {
     fn start(
         (first, second): Cores,
         regime: Regime,
-        rows: &[(Entry, usize)],
+        rows: &[(Entry, Beside)],
         observed: bool,
     ) -> Result<Self, BenchError> {
         let [ends, logic] = [first, second].map(|core| Placement {
@@ -135,10 +166,10 @@ impl Chains {
             boards: observed.then_some(BOARDS),
         };
         let mut chains: Vec<Box<dyn Chain>> = Vec::new();
-        for (entry, observers) in rows {
+        for (entry, beside) in rows {
             let mut chain: Box<dyn Chain> = match entry.label {
                 "floor" => Box::new(Floor::start(ends, logic)?),
-                label => Box::new(Robot::start(label, entry.mode, places, *observers)?),
+                label => Box::new(Robot::start(label, entry.mode, places, *beside)?),
             };
             chain.processes().rest();
             chains.push(chain);

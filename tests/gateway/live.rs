@@ -38,7 +38,7 @@ impl Topic for MuchNow {
 }
 
 /// A viewer that subscribes to everything.
-struct Viewer {
+pub(crate) struct Viewer {
     socket: WebSocket<TcpStream>,
     /// The topic of each channel number.
     topics: BTreeMap<u64, String>,
@@ -46,7 +46,7 @@ struct Viewer {
 
 impl Viewer {
     /// Subscribes to everything when the gateway has `topic`; `None` while nobody listens.
-    fn connect(address: &str, topic: &str) -> Option<Self> {
+    pub(crate) fn connect(address: &str, topic: &str) -> Option<Self> {
         let stream = TcpStream::connect(address).ok()?;
         let mut request = format!("ws://{address}")
             .into_client_request()
@@ -81,7 +81,7 @@ impl Viewer {
 
     /// The number in the next message of [`MuchNow`], and the message's length in bytes; `None` if
     /// none has come.
-    fn number(&mut self) -> Option<(u64, usize)> {
+    pub(crate) fn number(&mut self) -> Option<(u64, usize)> {
         loop {
             let bytes = match self.socket.read() {
                 // Opcode, subscription, time, message.

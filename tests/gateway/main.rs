@@ -1,8 +1,14 @@
 //! Tests of `lager gateway`: what it shows of a running robot to programs outside the bus.
 
+#[cfg(feature = "zenoh")]
+mod elsewhere;
 mod live;
 #[cfg(feature = "zenoh")]
+mod relay;
+#[cfg(feature = "zenoh")]
 mod remote;
+#[cfg(feature = "zenoh")]
+mod traps;
 #[cfg(feature = "zenoh")]
 mod zenoh;
 

@@ -12,17 +12,18 @@ use lager_remote::zenoh::{self, Config, Wait};
 use lager_remote::{Holder, Remote, make};
 use lager_tests::{Domain, Running, free, pid, wait_for};
 use lager_topics::{Role, TOPICS};
+use lager_wake::Shutdown;
 use rustix::process::{Signal, kill_process};
 use serde_json::{Value, json};
 
 use crate::live::{Much, MuchNow, send};
 
-fn said(of: &Output) -> String {
+pub(crate) fn said(of: &Output) -> String {
     String::from_utf8_lossy(&of.stderr).into_owned()
 }
 
 /// The JSON lines of a tool that has ended well.
-fn lines(of: &Output) -> Vec<Value> {
+pub(crate) fn lines(of: &Output) -> Vec<Value> {
     assert!(of.status.success(), "{}", said(of));
     let text = String::from_utf8_lossy(&of.stdout);
     let read = text
@@ -32,7 +33,7 @@ fn lines(of: &Output) -> Vec<Value> {
 }
 
 /// A robot with a gateway, when it answers.
-fn robot(domain: &Domain, endpoint: &str) -> Running {
+pub(crate) fn robot(domain: &Domain, endpoint: &str) -> Running {
     let up = domain.start(&["up", "--headless", "--no-station", "--zenoh", endpoint]);
     wait_for("the gateway", || {
         let listed = domain.run(&["topic", "list", "--remote", endpoint]);
@@ -112,8 +113,15 @@ fn the_tools_say_the_same_from_afar_as_on_the_bus() {
     assert!(said(&unknown).contains("it sends"), "{}", said(&unknown));
     let other = domain.run(&["--name", "r2", "topic", "list", "--remote", &endpoint]);
     assert!(said(&other).contains("the robot `r2`"), "{}", said(&other));
-    let info = domain.run(&["topic", "info", "nav/map", "--remote", &endpoint]);
-    assert_eq!(info.status.code(), Some(2), "{}", said(&info));
+    let info = ["topic", "info", "sensor/line", "--json"];
+    wait_for("the same properties", || {
+        let near = lines(&domain.run(&info));
+        let far = lines(&domain.run(&[&info[..], &["--remote", &endpoint]].concat()));
+        (far == near).then_some(())
+    });
+    let publishes = ["topic", "pub", "nav/map", "{}", "--remote", &endpoint];
+    let publishes = domain.run(&publishes);
+    assert_eq!(publishes.status.code(), Some(2), "{}", said(&publishes));
     let nobody = format!("tcp/{}", free());
     let nobody = domain.run(&["topic", "list", "--remote", &nobody]);
     assert!(
@@ -139,7 +147,7 @@ fn a_listener_that_sleeps_slows_nobody_and_knows_afterwards_what_it_missed() {
     let r1 = "r1".parse().expect("a name");
     let at = endpoint.parse().expect("an endpoint");
     let remote = wait_for("the gateway", || {
-        let remote = Remote::open(&at, &r1, None).ok()?;
+        let remote = Remote::open(&at, &r1, None, &Shutdown::new()).ok()?;
         remote
             .topics()
             .ok()?
@@ -209,7 +217,7 @@ fn next_of(line: &Value) -> u64 {
 }
 
 /// The numbers of the samples that have come.
-fn numbers(listening: &mut lager_remote::Listening) -> Vec<u64> {
+pub(crate) fn numbers(listening: &mut lager_remote::Listening) -> Vec<u64> {
     use lager_ports::{Look, Source as _};
     use lager_sample::Stamp;
 
@@ -231,7 +239,7 @@ fn numbers(listening: &mut lager_remote::Listening) -> Vec<u64> {
 }
 
 /// A configuration with these files of a folder of keys.
-fn configuration(
+pub(crate) fn configuration(
     domain: &Domain,
     name: &str,
     [authority, certificate]: [&str; 2],
@@ -387,8 +395,10 @@ fn over_the_network_only_those_who_prove_who_they_are_hear_the_robot() {
 
     // Where somebody answers all the same, a listener believes him only with the robot's certificate.
     let about = json!({
-        "layout": "A{a:u8}", "state": false, "rate": null, "publishers": 1, "subscribers": 1,
-        "observers": 1, "writers": {}, "boot": "",
+        "layout": "A{a:u8}", "state": false, "rate": null, "ends": {
+            "publishers": 1, "subscribers": 1, "observers": 1, "writers": {}, "readers": {},
+            "woken": {},
+        },
     });
     for (certificate, is_believed) in [("r2", false), ("r1", true)] {
         let listened = json!({

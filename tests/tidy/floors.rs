@@ -94,7 +94,13 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     // Both ends of what leaves the robot. It counts by stamps as the bus does, and opens none.
     (
         "lager-remote",
-        &["lager-home", "lager-ports", "lager-sample"],
+        &[
+            "lager-home",
+            "lager-ports",
+            "lager-sample",
+            "lager-topics",
+            "lager-wake",
+        ],
     ),
     (
         "lager-gateway",
@@ -232,12 +238,14 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "lager-floor",
             "lager-bridge",
+            "lager-gateway",
             "lager-home",
             "lager-lines",
             "lager-logic",
             "lager-operator",
             "lager-orders",
             "lager-ports",
+            "lager-remote",
             "lager-rig",
             "lager-sample",
             "lager-stop",

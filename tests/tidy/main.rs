@@ -181,35 +181,25 @@ fn only_ports_and_its_baseline_open_iceoryx2() {
 
 #[test]
 fn what_shows_the_robot_outside_has_nothing_that_writes_to_the_bus() {
-    const WRITES: [&str; 6] = [
-        ".publisher::<",
-        ".publisher()",
-        "any_publisher(",
-        ".client::<",
-        ".client()",
-        "StopWord::set",
-    ];
-    let mut complaints = Vec::new();
-    for file in rust_files(Path::new("services/gateway/src")) {
-        let text = std::fs::read_to_string(&file).expect("a source");
-        let found = WRITES.iter().filter(|word| text.contains(**word));
-        complaints.extend(found.map(|word| format!("{}: {word}", file.display())));
-    }
-    // It sends what it is given, and has no bus at all.
-    for file in rust_files(Path::new("services/remote/src")) {
-        let text = std::fs::read_to_string(&file).expect("a source");
-        if text.contains("Bus::") || text.contains("lager_ports::Bus") {
-            complaints.push(format!("{}: a bus", file.display()));
+    // What they read is a `Place`, which has no writers; only a `Bus` has, and the stop word.
+    const WRITES: [&str; 3] = ["Bus::", "Bus,", "StopWord::set"];
+    let writes = |folder: &Path| -> Vec<String> {
+        let mut found = Vec::new();
+        for file in rust_files(folder) {
+            let text = std::fs::read_to_string(&file).expect("a source");
+            let words = WRITES.iter().filter(|word| text.contains(**word));
+            found.extend(words.map(|word| format!("{}: {word}", file.display())));
         }
-    }
+        found
+    };
+    let mut complaints = writes(Path::new("services/gateway/src"));
+    complaints.extend(writes(Path::new("services/remote/src")));
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
-    // The words are those of what does write.
     let writer = root().join("services/logic/src");
-    let writes = rust_files(&writer).iter().any(|file| {
-        let text = std::fs::read_to_string(file).expect("a source");
-        WRITES.iter().any(|word| text.contains(word))
-    });
-    assert!(writes, "logic publishes, and not by any of these words");
+    assert!(
+        !writes(&writer).is_empty(),
+        "logic has a bus, and not by any of these words"
+    );
 }
 
 #[test]

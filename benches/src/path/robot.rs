@@ -27,8 +27,9 @@ use lager_rig::{Board, Domain, Outset, Process, SPEAK_EVERY_NS, interrupted, whe
 use lager_topics::Role;
 use lager_wire::{Callsign, Centimetres, Command, LineState, Payload, WheelCommand};
 
+use super::Beside;
 use super::processes::{ANSWER_WITHIN, Processes};
-use super::services::{BRIDGE, LOGIC, OBSERVER, Setup};
+use super::services::{BRIDGE, LOGIC, Setup, processes_of};
 use super::turn::{Chain, next_due, sleep_until};
 use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
@@ -84,13 +85,13 @@ pub(super) struct Places {
 }
 
 impl Robot {
-    /// Starts bridge, logic and `observers` observers, and lets the robot drive. Each observer is a
-    /// process of its own, as `lager topic echo` would be.
+    /// Starts bridge, logic and those `beside` them, and lets the robot drive. Each observer or listener
+    /// is a process of its own, as `lager topic echo` would be.
     pub(super) fn start(
         name: &'static str,
         mode: Mode,
         places: Places,
-        observers: usize,
+        beside: Beside,
     ) -> Result<Self, BenchError> {
         // Fails if the boards may not have that priority.
         drop(places.boards.map(RealTime::begin).transpose()?);
@@ -104,6 +105,7 @@ impl Robot {
             folder: domain.folder().to_owned(),
             mode,
             ports: [sensor.cable.path().clone(), steering.cable.path().clone()],
+            socket: domain.files().join("zenoh"),
         };
         let bus = setup.open(Role::Operator)?;
         let at = |place| Setup {
@@ -127,15 +129,21 @@ impl Robot {
             _domain: domain,
         };
         robot.set_out()?;
-        let start = |_| {
-            let mut observer = Process::start(OBSERVER)?;
-            observer.tell(&setup);
-            Ok::<Process, BenchError>(observer)
+        let start = |name| {
+            let mut process = Process::start(name)?;
+            process.tell(&setup);
+            Ok::<Process, BenchError>(process)
         };
-        let mut observers = (0..observers).map(start).collect::<Result<Vec<_>, _>>()?;
-        // They start together. The last one waits until the others have had their processor time.
-        for observer in &mut observers {
-            let () = observer.hear_within(2 * UP_WITHIN)?;
+        // Listeners call the gateway; the others start together. The last one waits until the others
+        // have had their processor time.
+        let mut observers = Vec::new();
+        for together in processes_of(beside) {
+            let started = together.into_iter().map(start);
+            let mut started = started.collect::<Result<Vec<_>, _>>()?;
+            for process in &mut started {
+                let () = process.hear_within(2 * UP_WITHIN)?;
+            }
+            observers.append(&mut started);
         }
         robot.processes.add(observers);
         Ok(robot)

@@ -17,6 +17,7 @@ use lager_topics::{Role, SensorLine, SteeringCommand};
 use lager_wake::Shutdown;
 use serde::{Deserialize, Serialize};
 
+use super::Beside;
 use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
 use crate::sample::drain;
@@ -24,10 +25,31 @@ use crate::sample::drain;
 /// The names of the processes.
 pub(super) const BRIDGE: &str = "path, bridge";
 pub(super) const LOGIC: &str = "path, logic";
-pub(super) const OBSERVER: &str = "path, observer";
+const OBSERVER: &str = "path, observer";
+#[cfg(feature = "zenoh")]
+const GATEWAY: &str = "path, gateway";
+#[cfg(feature = "zenoh")]
+const LISTENER: &str = "path, listener";
 
-pub(crate) const PROCESSES: &[(&str, Main)] =
-    &[(BRIDGE, bridge), (LOGIC, logic), (OBSERVER, observer)];
+pub(crate) const PROCESSES: &[(&str, Main)] = &[
+    (BRIDGE, bridge),
+    (LOGIC, logic),
+    (OBSERVER, observer),
+    #[cfg(feature = "zenoh")]
+    (GATEWAY, gateway),
+    #[cfg(feature = "zenoh")]
+    (LISTENER, listener),
+];
+
+/// The processes beside a path, in the order of their start: those of each list together.
+pub(super) fn processes_of(beside: Beside) -> Vec<Vec<&'static str>> {
+    match beside {
+        Beside::Nobody => Vec::new(),
+        Beside::Observers(count) => vec![vec![OBSERVER; count]],
+        #[cfg(feature = "zenoh")]
+        Beside::Listeners(count) => vec![vec![GATEWAY], vec![LISTENER; count]],
+    }
+}
 
 /// The period of an observer's looks: short enough for a person's eye.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
@@ -41,6 +63,8 @@ pub(super) struct Setup {
     pub(super) mode: Mode,
     /// The bridge's serial ports.
     pub(super) ports: [PathBuf; 2],
+    /// Where a gateway's listeners find it.
+    pub(super) socket: PathBuf,
 }
 
 impl Setup {
@@ -94,5 +118,56 @@ fn observer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         drain(&mut line)?;
         drain(&mut commands)?;
         std::thread::sleep(LOOK_EVERY);
+    }
+}
+
+/// The robot's gateway, as `lager gateway --zenoh` runs it.
+#[cfg(feature = "zenoh")]
+fn gateway(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    use lager_gateway::{Addresses, Gateway};
+    use lager_remote::{Allowed, Endpoint, Settings};
+
+    let (setup, bus) = told(parent, Role::Gateway)?;
+    let every = Allowed::new(&["*".to_owned()], &std::collections::BTreeMap::new());
+    let endpoint = Endpoint::Unix(setup.socket);
+    let settings = Settings::new(Some(endpoint), None, every?, None)?;
+    let addresses = Addresses {
+        zenoh: Some(settings),
+        ..Addresses::default()
+    };
+    let gateway = Gateway::open(addresses, bus.unit())?;
+    parent.say(&())?;
+    let never = Shutdown::new();
+    Ok(gateway.run(&bus, None, &lager_wake::Watchdog::default(), &never)?)
+}
+
+/// A listener: it gets every sample of every topic.
+#[cfg(feature = "zenoh")]
+fn listener(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    use lager_remote::{Endpoint, Remote};
+
+    /// As the tools look.
+    const LOOK: Duration = Duration::from_millis(5);
+
+    let setup: Setup = parent.told()?;
+    let robot = bus_at(&setup.folder).unit;
+    let endpoint = Endpoint::Unix(setup.socket);
+    let start = std::time::Instant::now();
+    let remote = loop {
+        // The gateway opens its topics one after the other.
+        match Remote::open(&endpoint, &robot, None, &Shutdown::new()) {
+            Err(_) if start.elapsed() < Duration::from_secs(5) => std::thread::sleep(LOOK),
+            opened => break opened?,
+        }
+    };
+    let topics = remote.topics()?.into_keys();
+    let topics = topics.map(|topic| remote.listen(&topic));
+    let mut topics = topics.collect::<Result<Vec<_>, _>>()?;
+    parent.say(&())?;
+    loop {
+        for topic in &mut topics {
+            while topic.receive().is_some() {}
+        }
+        std::thread::sleep(LOOK);
     }
 }

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import ctypes
 import time
-from typing import Any, AsyncIterator, Callable, Generic, Iterator, Optional, TypeVar, cast
+from typing import Any, AsyncIterator, Callable, Generic, Iterator, Optional, TypeVar, Union, cast
 
 from ._errors import Released, Unread
 from ._layout import Layout, TopicEntry
+from ._ledger import Ledger
 from ._streams import Streams
 from ._view import View
 from .layouts import Stamp
@@ -78,11 +79,19 @@ class Reader(Generic[P]):
     One that falls behind loses the oldest samples; `lost` says exactly how many.
     """
 
-    def __init__(self, port: Any, entry: TopicEntry, check: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        port: Any,
+        entry: TopicEntry,
+        check: Callable[[], None],
+        counts: Union[Streams, Ledger, None] = None,
+        clock: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
         self._port: Optional[Any] = port
         self._entry = entry
         self._check = check
-        self._streams = Streams(time.monotonic_ns())
+        self._streams = Streams(time.monotonic_ns()) if counts is None else counts
+        self._clock = clock
         self._current: Optional[Sample[P]] = None
         self._newest_ns = 0
         self._heard = time.monotonic()
@@ -115,7 +124,7 @@ class Reader(Generic[P]):
         one when its writer next looks for readers, a moment after the topic was opened."""
         self._release()
         while (sample := self._take()) is not None:
-            now_ns = time.monotonic_ns()
+            now_ns = self._clock()
             published_ns = sample.stamp.publish_time_ns
             if self._newest_ns <= published_ns <= now_ns + _AHEAD_NS:
                 self._newest_ns = min(published_ns, now_ns)

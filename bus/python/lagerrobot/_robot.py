@@ -1,4 +1,5 @@
-"""A robot's bus, joined as an observer: this package has no way to write to it.
+"""A robot's bus, joined as an observer, or its gateway elsewhere: this package has no way to write to
+either.
 
 Commands are given by the program `lager`; `_orders.py` says why.
 """
@@ -12,7 +13,7 @@ from typing import Any, Literal, Optional, Union
 
 import iceoryx2 as iox2
 
-from . import _described, _orders, _place
+from . import _described, _orders, _place, _remote
 from ._errors import NoBus, NotOperator, OtherLayout, OtherVersion, Unread
 from ._layout import TopicEntry
 from ._open import Open
@@ -44,6 +45,10 @@ class Robot(Open):
     in the thread that made it.
 
     With `role="operator"` it may also give commands, by the program `lager`.
+
+    With `remote="tcp/HOST:PORT"`, or `"tls/..."` and the files of `lager keys`, it is a robot on
+    another computer, heard over its `lager gateway --zenoh`. Then it can only be looked at. Needs the
+    package eclipse-zenoh: `pip install './bus/python[remote]'`.
     """
 
     def __init__(
@@ -53,9 +58,12 @@ class Robot(Open):
         bus: Optional[str] = None,
         role: Literal["observer", "operator"] = "observer",
         lager: str = "lager",
+        remote: Optional[str] = None,
+        authority: Optional[str] = None,
+        certificate: Optional[str] = None,
+        key: Optional[str] = None,
     ) -> None:
         super().__init__()
-        _check_version()
         if not _NAME.fullmatch(name) or name.startswith("iceoryx2"):
             raise NoBus(f"`{name}` is no robot's name: 1 to 24 of a-z, 0-9 and -")
         if role not in ("observer", "operator"):
@@ -63,13 +71,21 @@ class Robot(Open):
         self.name = name
         self.role = role
         self._lager = lager
+        self._link: Optional[_remote.Link] = None
+        self._node: Optional[Any] = None
+        if remote is not None:
+            if bus is not None or role == "operator":
+                raise NotOperator("a robot on another computer can only be looked at, by its gateway")
+            self._link = _remote.Link(name, remote, _proof(authority, certificate, key))
+            return
+        _check_version()
         self._place = _place.find(bus)
         self._port_name = f"observer/{os.getpid()}"
         builder = iox2.NodeBuilder.new().config(self._config())
         builder = builder.name(iox2.NodeName.new(f"lager/{name}/{self._port_name}"))
         builder = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled)
         try:
-            self._node: Optional[Any] = builder.create(iox2.ServiceType.Ipc)
+            self._node = builder.create(iox2.ServiceType.Ipc)
         except Exception as error:
             raise NoBus(f"the bus at {self._place.folder} cannot be joined: {error}") from error
 
@@ -88,8 +104,12 @@ class Robot(Open):
         """Leaves the bus; every sample is given back."""
         super().close()
         self._node = None
+        if self._link is not None:
+            self._link.close()
 
     def _read(self, entry: TopicEntry) -> Reader[Any]:
+        if self._link is not None:
+            return self._link.read(self._link.entry(entry) if entry.name in TOPICS else entry)
         if self._node is None:
             raise Unread("this robot is closed")
         service = self._service(self._node, entry)
@@ -129,6 +149,8 @@ class Robot(Open):
             raise Unread(f"`{entry.name}` cannot be read: {error}") from error
 
     def _described(self, name: str) -> TopicEntry:
+        if self._link is not None:
+            return self._link.described(name)
         if self._node is None:
             raise Unread("this robot is closed")
         try:
@@ -184,6 +206,16 @@ class Robot(Open):
     def _check_there(self) -> None:
         if _place.generation_in(self._place.folder) != self._place.generation:
             raise NoBus("the bus was damaged and has been cleared; open the robot again")
+
+
+def _proof(
+    authority: Optional[str], certificate: Optional[str], key: Optional[str]
+) -> Optional[_remote.Proof]:
+    if authority is None or certificate is None or key is None:
+        if authority or certificate or key:
+            raise NoBus("authority=, certificate= and key= belong together; give all three, or none")
+        return None
+    return _remote.Proof(authority, certificate, key)
 
 
 def _said(service: Any, key: str) -> str:

@@ -7,7 +7,7 @@ writer is a new stream and no loss, and a false stamp counts nothing.
 from __future__ import annotations
 
 import time
-from typing import Dict, Tuple
+from typing import Dict, Optional, Tuple
 
 from .layouts import Stamp
 
@@ -51,14 +51,14 @@ class Streams:
         self.received = 0
         self.lost = 0
 
-    def note(self, stamp: Stamp) -> None:
-        """Notes a received sample."""
+    def note(self, stamp: Stamp, now_ns: Optional[int] = None) -> None:
+        """Notes a received sample, at this time of the stamps' clock."""
         self.received += 1
         key = (stamp.writer, stamp.epoch)
         # The one heard last comes last, so that the longest silent one is forgotten first.
         stream = self._known.pop(key, None)
         if stream is None:
-            self._meet(key, stamp.sequence)
+            self._meet(key, stamp.sequence, _now(now_ns))
             return
         self._known[key] = stream
         if stamp.sequence == stream.next:
@@ -66,10 +66,9 @@ class Streams:
             stream.gap = range(0)
             stream.heard_ns = max(stream.heard_ns, stamp.publish_time_ns)
         else:
-            self.lost += stream.jump(stamp.sequence, stamp.publish_time_ns, time.monotonic_ns())
+            self.lost += stream.jump(stamp.sequence, stamp.publish_time_ns, _now(now_ns))
 
-    def _meet(self, key: Tuple[int, int], sequence: int) -> None:
-        now_ns = time.monotonic_ns()
+    def _meet(self, key: Tuple[int, int], sequence: int, now_ns: int) -> None:
         epoch = key[1]
         if sequence > _sendable(epoch, now_ns):
             return
@@ -81,6 +80,10 @@ class Streams:
         gap = range(sequence) if is_younger else range(0)
         heard_ns = min(max(epoch, self._attached_ns), now_ns)
         self._known[key] = _Stream(sequence + 1, gap, heard_ns)
+
+
+def _now(now_ns: Optional[int]) -> int:
+    return time.monotonic_ns() if now_ns is None else now_ns
 
 
 def _sendable(since_ns: int, now_ns: int) -> int:

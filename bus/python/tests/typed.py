@@ -1,5 +1,7 @@
 """What a program may write, and mypy must accept."""
 
+from typing import Optional
+
 from lagerrobot import Bag, Robot
 from lagerrobot.layouts import LineFrame, LineState
 
@@ -23,3 +25,12 @@ def farthest(path: str) -> float:
 def fetch(product: int) -> str:
     with Robot("r1", role="operator") as robot:
         return robot.tell("fetch", product)
+
+
+def afar(endpoint: str) -> int:
+    with Robot("r1", remote=endpoint) as robot:
+        frame: Optional[LineFrame] = None
+        for sample in robot.topic("sensor/line"):
+            frame = sample.copy()
+            break
+        return frame.bits if frame else 0

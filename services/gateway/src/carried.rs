@@ -1,7 +1,10 @@
 //! Every sample as it is, for listeners on other computers ([`lager_remote::Carrier`]).
 
-use lager_ports::TopicInfo;
-use lager_remote::{Carrier, Kind};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use lager_ports::{Peer, TopicInfo};
+use lager_remote::{Carrier, Ends, Kind};
 use lager_sample::{Description, Stamp};
 
 use crate::listener::Outlet;
@@ -13,10 +16,15 @@ impl Outlet for Carrier {
 
     fn look_at_ends(&mut self, topics: &[TopicInfo]) {
         for topic in topics {
-            let ends = [topic.publishers, topic.subscribers, topic.observers];
-            let writers = topic.writers.iter();
-            let writers = writers.filter_map(|peer| Some((peer.pid, peer.part.clone()?)));
-            self.tell_of(&topic.name, ends, writers.collect());
+            let ends = Ends {
+                publishers: topic.publishers,
+                subscribers: topic.subscribers,
+                observers: topic.observers,
+                writers: parts(&topic.writers),
+                readers: parts(&topic.readers),
+                woken: parts(&topic.woken),
+            };
+            self.tell_of(&topic.name, ends);
         }
     }
 
@@ -24,7 +32,14 @@ impl Outlet for Carrier {
         Carrier::take(self, topic, stamp, lost, payload);
     }
 
-    fn tick(&mut self) {
-        Carrier::tick(self);
+    fn tick(&mut self, robot: Duration) {
+        Carrier::tick(self, robot);
     }
+}
+
+/// The parts of those processes that are the application's.
+fn parts(peers: &[Peer]) -> BTreeMap<u32, String> {
+    let known = peers.iter();
+    let known = known.filter_map(|peer| Some((peer.pid, peer.part.clone()?)));
+    known.collect()
 }

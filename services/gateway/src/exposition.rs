@@ -6,7 +6,6 @@
 
 use std::fmt::{Display, Write};
 
-use lager_home::Clock;
 use lager_orders::Mode;
 use lager_sample::Coded;
 use lager_stop::Stop;
@@ -17,12 +16,13 @@ use crate::figures::Figures;
 /// The media type of the text.
 pub(crate) const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-/// All figures. `stop` comes from the stop word; `None` if it cannot be read.
+/// All figures. `stop` comes from the stop word; `None` if it cannot be read, as of a robot elsewhere.
+/// Then the bridge's last word counts.
 pub(crate) fn text(figures: &Figures, stop: Option<Option<Stop>>) -> String {
     let mut text = Text {
         out: String::with_capacity(32 << 10),
         robot: figures.robot.clone(),
-        unix_offset_ns: Clock::unix_offset_ns(),
+        unix_offset_ns: figures.unix_offset_ns,
     };
     let mut build = text.gauge("lager_build_info", "1, with the version of the gateway.");
     build.add(&[("version", env!("CARGO_PKG_VERSION"))], 1);
@@ -105,8 +105,12 @@ fn robot(text: &mut Text, figures: &Figures, stop: Option<Option<Stop>>) {
         "lager_stop_latched",
         "Whether the robot is stopped: 1 at the cause of the stop that is latched.",
     );
-    if let Some(stop) = stop {
-        let cause = stop.map_or(StopCause::None, Stop::cause);
+    let told = health.map(|health| match health.stopped {
+        0 => StopCause::None,
+        _ => health.stop_cause.get().unwrap_or(StopCause::None),
+    });
+    let cause = stop.map_or(told, |stop| Some(stop.map_or(StopCause::None, Stop::cause)));
+    if let Some(cause) = cause {
         for (known, name) in StopCause::VARIANTS {
             if *known != StopCause::None {
                 latch.add(&[("cause", &snake(name))], u8::from(*known == cause));

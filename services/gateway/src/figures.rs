@@ -5,6 +5,7 @@ use std::any::Any;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use lager_home::Clock;
 use lager_ports::TopicInfo;
 use lager_sample::Stamp;
 use lager_topics::{
@@ -30,6 +31,8 @@ pub(crate) struct TopicFigures {
 #[derive(Clone, Debug)]
 pub(crate) struct Figures {
     pub(crate) robot: String,
+    /// The difference between ns since 1970 and a stamp's time, by the robot's calendar.
+    pub(crate) unix_offset_ns: i64,
     pub(crate) topics: BTreeMap<String, TopicFigures>,
     pub(crate) health: Option<Health>,
     pub(crate) status: Option<NavigatorStatus>,
@@ -46,6 +49,7 @@ impl Figures {
     pub(crate) fn new(robot: &str) -> Self {
         Self {
             robot: robot.to_owned(),
+            unix_offset_ns: Clock::unix_offset_ns(),
             topics: BTreeMap::new(),
             health: None,
             status: None,
@@ -98,12 +102,14 @@ impl Figures {
         }
     }
 
-    /// The programs that write and read the topics.
-    pub(crate) fn look_at_ends(&mut self, topics: &[TopicInfo]) {
+    /// The programs that write and read the topics. Of those on another machine nothing more is known.
+    pub(crate) fn look_at_ends(&mut self, topics: &[TopicInfo], are_here: bool) {
         for topic in topics {
             let figures = self.topics.entry(topic.name.clone()).or_default();
             (figures.writers, figures.readers) = (topic.publishers, topic.subscribers);
         }
-        self.processes = processes::at(topics);
+        if are_here {
+            self.processes = processes::at(topics);
+        }
     }
 }

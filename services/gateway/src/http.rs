@@ -79,7 +79,8 @@ async fn metrics(
     }
     visitor.admit();
     // Read the word now, as the bridge does before each packet, so that a stop is visible at once.
-    let stop = StopWord::read(&shared.stop_word).ok();
+    let word = shared.stop_word.as_ref();
+    let stop = word.and_then(|word| StopWord::read(word).ok());
     let stop = stop.map(|told| told.and_then(|told| told.stop()));
     let text = exposition::text(&shared.figures(), stop);
     ([(header::CONTENT_TYPE, MEDIA_TYPE)], text).into_response()

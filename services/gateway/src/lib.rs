@@ -18,7 +18,9 @@
 //! - `carried`: every sample as it is, to `lager_remote::Carrier`; only with the feature `zenoh`.
 //! - `processes`: processor time and memory of each process of the robot.
 //!
-//! It never writes to the bus, and nobody waits for it. A request gets the figures of the last
+//! In place of the bus, the figures and views can be those of a robot elsewhere, from its own gateway.
+//!
+//! It never writes to the bus: what it reads is a [`Place`], which has no writers. Nobody waits for it. A request gets the figures of the last
 //! poll. The listener reads every sample; if it has missed some, a figure says so.
 
 #![forbid(unsafe_code)]
@@ -35,13 +37,13 @@ mod processes;
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lager_home::UnitName;
-use lager_ports::{Bus, IntrospectError, ReceiveError};
+use lager_ports::{IntrospectError, Place, PlaceError, PortError, ReceiveError};
 use lager_remote::Settings;
-use lager_stop::StopPage;
 use lager_wake::{Shutdown, Watchdog};
 use tokio::runtime::Runtime;
 
@@ -103,12 +105,28 @@ pub enum GatewayError {
     /// The state of the bus could not be read.
     #[error(transparent)]
     Look(#[from] IntrospectError),
+    /// A topic could not be opened.
+    #[error(transparent)]
+    Open(#[from] PortError),
+    /// The place elsewhere where the samples come from says why.
+    #[error(transparent)]
+    Elsewhere(Box<dyn std::error::Error + Send + Sync>),
     /// A topic could not be read.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
     /// The bus is another one now, so no sample will come any more.
     #[error("the bus was damaged and replaced since the gateway joined it; start it again")]
     Cleared,
+}
+
+impl From<PlaceError> for GatewayError {
+    fn from(error: PlaceError) -> Self {
+        match error {
+            PlaceError::Open(error) => Self::Open(error),
+            PlaceError::Look(error) => Self::Look(error),
+            PlaceError::Elsewhere(error) => Self::Elsewhere(error),
+        }
+    }
 }
 
 impl GatewayError {
@@ -214,19 +232,23 @@ impl Gateway {
         &self.at
     }
 
-    /// Reads the robot of `bus` and answers until `shutdown` is requested.
+    /// Reads the robot at `place`, its bus or its gateway elsewhere, and answers until `shutdown` is
+    /// requested. `stop_word` is where the robot's stop word lies, if it is here.
+    ///
+    /// A place has no writers, so nothing in this crate could write to a bus.
     ///
     /// # Errors
-    /// The bus cannot be read any more, or the system does not let it run.
+    /// The robot cannot be read any more, or the system does not let it run.
     pub fn run(
         self,
-        bus: &Bus,
+        place: &impl Place,
+        stop_word: Option<PathBuf>,
         watchdog: &Watchdog,
         shutdown: &Shutdown,
     ) -> Result<(), GatewayError> {
         let shared = Shared {
-            figures: Arc::new(Mutex::new(Figures::new(bus.unit().as_str()))),
-            stop_word: bus.home().folder_of(bus.unit()).join(StopPage::FILE),
+            figures: Arc::new(Mutex::new(Figures::new(place.unit().as_str()))),
+            stop_word,
         };
         let over = AtomicBool::new(false);
         std::thread::scope(|scope| {
@@ -238,7 +260,8 @@ impl Gateway {
                     .spawn_scoped(scope, move || http::serve(runtime, metrics, shared, over))?
             };
             let is_over = || served.is_finished();
-            let listened = listener::listen(bus, watchdog, shutdown, &shared, self.shown, is_over);
+            let listened =
+                listener::listen(place, watchdog, shutdown, &shared, self.shown, is_over);
             over.store(true, Ordering::Relaxed);
             let served = served.join().expect("the server does not panic");
             listened?;
@@ -281,8 +304,8 @@ fn open_outlet(_settings: &Settings, _robot: &UnitName) -> Result<Box<dyn Outlet
 #[derive(Clone, Debug)]
 pub(crate) struct Shared {
     figures: Arc<Mutex<Figures>>,
-    /// Where the robot's stop word lies.
-    pub(crate) stop_word: std::path::PathBuf,
+    /// Where the robot's stop word lies, if it is here.
+    pub(crate) stop_word: Option<PathBuf>,
 }
 
 impl Shared {

@@ -1,16 +1,14 @@
-//! The thread that polls the bus.
+//! The thread that polls the bus, or what a robot's gateway elsewhere has sent.
 
-use std::any::Any;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use lager_home::{BusWatch, Clock};
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    Bus, Found, IntrospectError, Layout, PortError, ReceiveError, Source, Subscriber, TopicInfo,
+    IntrospectError, Layout, Look, Place, PlaceError, Raw, ReceiveError, Source, TopicInfo, Watched,
 };
 use lager_remote::Kind;
-use lager_sample::{Description, Stamp, Topic, bytes_of};
+use lager_sample::{Description, Stamp, Topic};
 use lager_topics::{TOPICS, TopicVisitor, visit};
 use lager_wake::{Pace, Shutdown, Watchdog};
 use serde::Serialize;
@@ -31,8 +29,8 @@ pub(crate) trait Viewer {
     /// Whether the next sample of a topic need be written at all.
     fn wants(&self, topic: &str) -> bool;
 
-    /// Takes a message.
-    fn take(&mut self, topic: &str, stamp: &Stamp, message: &[u8]);
+    /// Takes a message that was published at that time, in ns since 1970.
+    fn take(&mut self, topic: &str, unix_ns: u64, message: &[u8]);
 }
 
 /// A part that gets every sample at once, as it lies in memory.
@@ -46,8 +44,8 @@ pub(crate) trait Outlet {
     /// Takes a sample. The bus has lost `lost` samples of the topic so far.
     fn take(&mut self, topic: &str, stamp: &Stamp, lost: u64, payload: &[u8]);
 
-    /// Has its turn after each look at the bus.
-    fn tick(&mut self);
+    /// Has its turn after each look at the bus; `robot` is the robot's own time.
+    fn tick(&mut self, robot: Duration);
 }
 
 /// Those who get each sample, if there are any.
@@ -60,8 +58,8 @@ pub(crate) struct Shown {
 }
 
 /// Reads every topic until a request to end, or until `is_over`.
-pub(crate) fn listen(
-    bus: &Bus,
+pub(crate) fn listen<P: Place>(
+    place: &P,
     watchdog: &Watchdog,
     shutdown: &Shutdown,
     shared: &Shared,
@@ -75,23 +73,21 @@ pub(crate) fn listen(
         false => Pace::counting(),
     };
     let mut listener = Listener {
-        bus,
+        place,
         watchdog,
-        clock: bus.clock(),
         viewer,
         outlet,
         feeds: Vec::new(),
         opened: BTreeSet::new(),
         refused: BTreeSet::new(),
-        services: BusWatch::of_services(),
-        ports: BusWatch::of_ports(),
+        watch: place.watch(Watched::Ends),
     };
     let mut looked: Option<Instant> = None;
     let mut is_short = false;
     while !shutdown.is_requested() && !is_over() {
         if looked.is_none_or(|looked| looked.elapsed() >= LOOK) {
             looked = Some(Instant::now());
-            if !bus.is_listed() {
+            if !place.may_still_tell() {
                 return Err(GatewayError::Cleared);
             }
             match listener.look(shared) {
@@ -109,7 +105,8 @@ pub(crate) fn listen(
         }
         listener.drain(shared, &mut pace)?;
         if let Some(outlet) = &mut listener.outlet {
-            outlet.tick();
+            let robot = place.unit_time();
+            outlet.tick(robot.map_or(Duration::ZERO, |(_, robot)| robot));
         }
         std::thread::sleep(pace.wait());
     }
@@ -117,18 +114,16 @@ pub(crate) fn listen(
 }
 
 /// Everything that is listened to.
-struct Listener<'a> {
-    bus: &'a Bus,
+struct Listener<'a, P: Place> {
+    place: &'a P,
     watchdog: &'a Watchdog,
-    clock: Clock,
     viewer: Option<Box<dyn Viewer>>,
     outlet: Option<Box<dyn Outlet>>,
     feeds: Vec<Box<dyn Feed>>,
     opened: BTreeSet<String>,
     /// Topics that could not be opened and were reported.
     refused: BTreeSet<String>,
-    services: BusWatch,
-    ports: BusWatch,
+    watch: P::Watch,
 }
 
 /// A topic that is listened to.
@@ -137,31 +132,29 @@ trait Feed {
     fn about(&self) -> (Description, Kind);
 
     /// Takes the new samples. Returns how full the topic's queue was.
-    fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError>;
+    fn drain(&mut self, to: &mut Takers<'_, '_>, pace: &mut Pace) -> Result<(), ReceiveError>;
 }
 
 /// The receivers of each sample.
-struct Takers<'a> {
+struct Takers<'a, 'b> {
     figures: &'a mut Figures,
     real: &'a dyn Fn(Duration) -> Duration,
-    viewer: Option<&'a mut (dyn Viewer + 'static)>,
-    outlet: Option<&'a mut (dyn Outlet + 'static)>,
+    viewer: Option<&'a mut (dyn Viewer + 'b)>,
+    outlet: Option<&'a mut (dyn Outlet + 'b)>,
 }
 
-impl Takers<'_> {
-    /// Of any topic.
-    fn count<P: Serialize>(
-        &mut self,
-        topic: &str,
-        stamp: &Stamp,
-        lost: u64,
-        (payload, bytes): (&P, &[u8]),
-    ) {
-        self.figures.count(topic, stamp, lost);
-        if let Some(outlet) = &mut self.outlet {
-            outlet.take(topic, stamp, lost, bytes);
-        }
-        let Some(viewer) = self.viewer.as_mut().filter(|viewer| viewer.wants(topic)) else {
+/// Gives a sample of this topic to all of them.
+struct Give<'a, 'b, 'c> {
+    topic: &'a str,
+    to: &'a mut Takers<'b, 'c>,
+}
+
+impl Look for Give<'_, '_, '_> {
+    type Output = ();
+
+    fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, payload: &P) {
+        let (topic, to) = (self.topic, self.to);
+        let Some(viewer) = to.viewer.as_mut().filter(|viewer| viewer.wants(topic)) else {
             return;
         };
         let envelope = Envelope {
@@ -171,47 +164,60 @@ impl Takers<'_> {
             payload,
         };
         let message = serde_json::to_vec(&envelope).expect("a payload is JSON");
-        viewer.take(topic, stamp, &message);
+        let offset_ns = to.figures.unix_offset_ns;
+        let unix_ns = stamp.publish_time_ns.saturating_add_signed(offset_ns);
+        viewer.take(topic, unix_ns, &message);
+    }
+
+    fn look_at<P: Serialize>(self, stamp: &Stamp, lost: u64, payload: &P, raw: Raw<'_>) {
+        let (topic, to) = (self.topic, &mut *self.to);
+        to.figures.count(topic, stamp, lost);
+        if let Some(typed) = raw.typed {
+            to.figures.learn(stamp, typed, to.real);
+        }
+        if let Some(outlet) = &mut to.outlet {
+            outlet.take(topic, stamp, lost, raw.bytes);
+        }
+        self.look(stamp, lost, payload);
     }
 }
 
-impl Listener<'_> {
+impl<P: Place> Listener<'_, P> {
     /// Opens new topics, of the table and of other programs, and updates the writers and readers of
     /// all topics where ports have come or gone. Tries a topic again that could not be opened.
     fn look(&mut self, shared: &Shared) -> Result<(), GatewayError> {
+        let place = self.place;
         for entry in TOPICS {
             if !self.opened.contains(entry.name) {
-                let open = || visit(entry.name, Open { bus: self.bus });
+                let open = || visit(entry.name, Open { place });
                 let opened = self.watchdog.over("opening the topic", open);
-                self.keep(entry.name, opened.expect("a topic of the table").map(Some));
+                self.keep(entry.name, opened.expect("a topic of the table"));
             }
         }
-        // Both, so that each knows what is there now.
-        let place = self.bus.home();
-        if !(self.services.has_changed(place) | self.ports.has_changed(place)) {
+        shared.figures().unix_offset_ns = place.time().unix_offset_ns;
+        if !place.has_changed(&mut self.watch) {
             return Ok(());
         }
-        let look = || self.bus.topics();
-        let mut topics = self.watchdog.over("listing the topics", look)?;
-        topics.retain(|topic| topic.unit == *self.bus.unit());
+        let look = || place.every_topic();
+        let topics = self.watchdog.over("listing the topics", look);
+        let topics = topics.map_err(PlaceError::of)?;
         for topic in &topics {
             let is_new = topic.entry.is_none() && !self.opened.contains(&topic.name);
             if is_new && topic.layout == Layout::Described {
-                let open = || self.bus.found(&topic.name);
+                let open = || place.described(&topic.name);
                 let opened = self.watchdog.over("opening the topic", open);
-                let opened =
-                    opened.map(|found| found.map(|found| Box::new(found) as Box<dyn Feed>));
-                self.keep(&topic.name, opened);
+                let feed = |from| Box::new(FeedOf::new(&topic.name, from)) as Box<dyn Feed>;
+                self.keep(&topic.name, opened.map(|found| found.map(feed)));
             }
         }
-        shared.figures().look_at_ends(&topics);
+        shared.figures().look_at_ends(&topics, place.is_here());
         if let Some(outlet) = &mut self.outlet {
             outlet.look_at_ends(&topics);
         }
         Ok(())
     }
 
-    fn keep(&mut self, name: &str, opened: Result<Option<Box<dyn Feed>>, PortError>) {
+    fn keep(&mut self, name: &str, opened: Result<Option<Box<dyn Feed>>, P::OpenError>) {
         match opened {
             Ok(Some(feed)) => {
                 self.opened.insert(name.to_owned());
@@ -240,7 +246,7 @@ impl Listener<'_> {
         let mut figures = shared.figures();
         let mut to = Takers {
             figures: &mut figures,
-            real: &|robot| self.clock.real(robot),
+            real: &|robot| self.place.real(robot),
             viewer: self.viewer.as_deref_mut(),
             outlet: self.outlet.as_deref_mut(),
         };
@@ -251,69 +257,53 @@ impl Listener<'_> {
     }
 }
 
-struct Open<'a> {
-    bus: &'a Bus,
+struct Open<'a, P> {
+    place: &'a P,
 }
 
-impl TopicVisitor for Open<'_> {
-    type Output = Result<Box<dyn Feed>, PortError>;
+impl<P: Place> TopicVisitor for Open<'_, P> {
+    type Output = Result<Option<Box<dyn Feed>>, P::OpenError>;
 
     fn visit<T: Topic>(self) -> Self::Output {
-        Ok(Box::new(self.bus.subscriber::<T>()?))
+        let from = self.place.typed::<T>()?;
+        Ok(from.map(|from| Box::new(FeedOf::new(T::NAME, from)) as Box<dyn Feed>))
     }
 }
 
-impl<T: Topic> Feed for Subscriber<T> {
-    fn about(&self) -> (Description, Kind) {
-        let entry = TOPICS.iter().find(|entry| entry.name == T::NAME);
-        let kind = match entry.and_then(|entry| entry.period_ms) {
-            _ if self.holds() => Kind::State,
-            Some(_) => Kind::Stream,
-            None => Kind::Event,
-        };
-        (Description::of::<T::Payload>(), kind)
-    }
+struct FeedOf<S> {
+    name: String,
+    from: S,
+}
 
-    fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError> {
-        let mut found = 0;
-        while found < TURN {
-            let Some(sample) = self.receive()? else {
-                break;
-            };
-            found += 1;
-            let payload: &T::Payload = &sample;
-            let lost = Subscriber::lost(self);
-            to.count(T::NAME, sample.stamp(), lost, (payload, bytes_of(payload)));
-            let real = to.real;
-            to.figures.learn(sample.stamp(), payload as &dyn Any, real);
-        }
-        pace.found(found, self.queue());
-        Ok(())
+impl<S> FeedOf<S> {
+    fn new(name: &str, from: S) -> Self {
+        let name = name.to_owned();
+        Self { name, from }
     }
 }
 
-impl Feed for Found {
+impl<S: Source> Feed for FeedOf<S> {
     fn about(&self) -> (Description, Kind) {
-        let kind = match self.holds() {
-            true => Kind::State,
-            // Its period is not known.
-            false => Kind::Stream,
+        let entry = TOPICS.iter().find(|entry| entry.name == self.name);
+        let kind = match entry {
+            _ if self.from.holds() => Kind::State,
+            Some(entry) if entry.period_ms.is_none() => Kind::Event,
+            // Of a topic of another program the period is not known.
+            _ => Kind::Stream,
         };
-        (self.description().clone(), kind)
+        (self.from.description(), kind)
     }
 
-    fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError> {
-        let name = self.name().to_owned();
+    fn drain(&mut self, to: &mut Takers<'_, '_>, pace: &mut Pace) -> Result<(), ReceiveError> {
         let mut found = 0;
         while found < TURN {
-            let Some((sample, lost)) = self.receive_counted()? else {
+            let topic = &self.name;
+            if self.from.next(Give { topic, to })?.is_none() {
                 break;
-            };
+            }
             found += 1;
-            let payload = sample.payload();
-            to.count(&name, sample.stamp(), lost, (&payload, payload.bytes()));
         }
-        pace.found(found, self.queue());
+        pace.found(found, self.from.queue());
         Ok(())
     }
 }

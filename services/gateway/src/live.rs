@@ -18,9 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use foxglove::websocket::{ChannelView, Client, ServerListener};
 use foxglove::{ChannelId, Context, FoxgloveError, PartialMetadata, RawChannel, Schema};
-use lager_home::Clock;
 use lager_journal::{EnvelopeSchema, Scene, View};
-use lager_sample::Stamp;
 use tokio::runtime::Runtime;
 
 use crate::GatewayError;
@@ -31,8 +29,6 @@ pub(crate) struct Live {
     /// The server knows it only weakly.
     context: Arc<Context>,
     address: SocketAddr,
-    /// The difference between ns since 1970 and a stamp's time.
-    unix_offset_ns: i64,
     scene: Scene,
     topics: BTreeMap<String, Outlet>,
     views: BTreeMap<View, Outlet>,
@@ -75,7 +71,6 @@ impl Live {
         Ok(Self {
             address: SocketAddr::new(address.ip(), server.port()),
             context,
-            unix_offset_ns: Clock::unix_offset_ns(),
             scene: Scene::default(),
             topics: BTreeMap::new(),
             views: views.into(),
@@ -111,9 +106,7 @@ impl Viewer for Live {
         self.topics.get(topic).is_some_and(is_watched) || Scene::looks_at(topic)
     }
 
-    fn take(&mut self, topic: &str, stamp: &Stamp, message: &[u8]) {
-        let published = stamp.publish_time_ns;
-        let unix_ns = published.saturating_add_signed(self.unix_offset_ns);
+    fn take(&mut self, topic: &str, unix_ns: u64, message: &[u8]) {
         if let Some(outlet) = self.topics.get(topic) {
             self.kept.send(outlet, unix_ns, message);
         }

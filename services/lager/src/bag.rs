@@ -1,5 +1,6 @@
 //! `lager bag`: runs the recorder's tools as the command line says.
 
+mod collect;
 mod verify;
 
 use std::io::{BufWriter, IsTerminal, Write};
@@ -9,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use lager_home::Clock;
-use lager_ports::Bus;
+use lager_ports::{Bus, Place};
 use lager_recorder::{
     BagError, PlayConfig, PlayError, Progress, RecordConfig, Recorded, Split, Stamps,
 };
@@ -22,7 +23,7 @@ use crate::cli::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 use crate::config::Config;
 use crate::time_limit::TimeLimit;
 use crate::traces::Speaker;
-use crate::{diagnose, exit};
+use crate::{afar, diagnose, exit};
 
 /// How often the recorder writes the samples to the disk. A kill loses the samples since the last
 /// finished write: on a busy machine less than 300 ms.
@@ -66,31 +67,54 @@ fn record(
     as_json: bool,
     shutdown: &Shutdown,
 ) -> Result<ExitCode> {
+    if args.every_robot {
+        return collect::run(config, args, as_json, shutdown);
+    }
     let in_table = |name: &String| TOPICS.iter().any(|entry| entry.name == name);
     // Topics of other programs need no robot.
-    if !args.wait && (args.topic.is_empty() || args.topic.iter().any(in_table)) {
+    let needs_robot = args.topic.is_empty() || args.topic.iter().any(in_table);
+    if args.remote.is_none() && !args.wait && needs_robot {
         diagnose::must_be_up(config)?;
     }
-    let wanted = RecordConfig {
-        or_another: args.file.is_none(),
-        file: args.file.unwrap_or_else(|| named_after(&config.name)),
-        topics: args.topic,
+    let wanted = wanted(&args, args.file.clone(), &config.name);
+    let patience = TimeLimit::in_order(config, shutdown)?;
+    if let Some(endpoint) = &args.remote {
+        let remote = afar::call(config, endpoint, shutdown)?;
+        return record_at(&remote, &wanted, as_json, &patience);
+    }
+    let join = || Bus::open(&config.bus()?, Role::Recorder).map_err(anyhow::Error::from);
+    let bus = patience.watchdog.over("joining the bus", join)?;
+    record_at(&bus, &wanted, as_json, &patience)
+}
+
+/// What is recorded of `robot`, into `file` if one is named.
+fn wanted(args: &RecordArgs, file: Option<PathBuf>, robot: &str) -> RecordConfig {
+    RecordConfig {
+        or_another: file.is_none(),
+        file: file.unwrap_or_else(|| named_after(robot)),
+        topics: args.topic.clone(),
         split: Split {
             bytes: args.split_size.map(|mib| mib << 20),
             time: args.split_time.map(Duration::from_secs_f64),
         },
         queue: args.queue,
         flush: FLUSH,
-    };
-    let patience = TimeLimit::in_order(config, shutdown)?;
-    let join = || Bus::open(&config.bus()?, Role::Recorder).map_err(anyhow::Error::from);
-    let bus = patience.watchdog.over("joining the bus", join)?;
+    }
+}
+
+fn record_at(
+    place: &impl Place,
+    wanted: &RecordConfig,
+    as_json: bool,
+    patience: &TimeLimit,
+) -> Result<ExitCode> {
     let mut live = Live::new(as_json);
     let mut tell = |progress: &Progress| live.tell(progress);
-    let recorded = lager_recorder::record(&bus, &patience.watchdog, shutdown, &wanted, &mut tell);
+    let (watchdog, shutdown) = (&patience.watchdog, &patience.shutdown);
+    let recorded = lager_recorder::record(place, watchdog, shutdown, wanted, &mut tell);
     live.end();
     let recorded = recorded?;
-    sum_up(&recorded, as_json)?;
+    sum_up(place.unit().as_str(), &recorded, as_json)?;
     match recorded.ended_by {
         None => Ok(ExitCode::SUCCESS),
         Some(error) => Err(error.into()),
@@ -183,7 +207,7 @@ fn mib(bytes: u64) -> f64 {
 }
 
 /// The last lines: the files, and for each topic how many samples were recorded and lost.
-fn sum_up(recorded: &Recorded, as_json_line: bool) -> Result<()> {
+fn sum_up(robot: &str, recorded: &Recorded, as_json_line: bool) -> Result<()> {
     for absent in &recorded.absent {
         let line = format!("{absent} was never there, so nothing of it is recorded");
         console::complain(&Speaker::Tool.line(&line));
@@ -197,6 +221,7 @@ fn sum_up(recorded: &Recorded, as_json_line: bool) -> Result<()> {
     if as_json_line {
         let mut value = as_json(progress);
         value["files"] = json!(files);
+        value["robot"] = json!(robot);
         return console::print(&value.to_string());
     }
     let total = progress.total();

@@ -3,16 +3,24 @@
 use anyhow::{Context, Result};
 use lager_gateway::{Addresses, Gateway, GatewayError, USUAL_METRICS};
 use lager_ports::Bus;
+use lager_stop::StopPage;
 use lager_supervisor::Service;
 use lager_supervisor::console;
 use lager_supervisor::runtime_folder::RuntimeFolder;
-use lager_wake::Shutdown;
+use lager_wake::{Shutdown, Watchdog};
 
+use crate::afar;
 use crate::cli::GatewayArgs;
 use crate::config::Config;
+#[cfg(feature = "zenoh")]
+use crate::config::ZenohSection;
 use crate::exit;
 use crate::reach;
 use crate::time_limit::TimeLimit;
+
+/// How often a router looks whether somebody ends it.
+#[cfg(feature = "zenoh")]
+const LOOK: std::time::Duration = std::time::Duration::from_millis(20);
 
 /// The configuration that it runs with, and where it answers. If it starts beside a robot that is
 /// up, it takes over that robot's clock, because the boards' silence counts in that time.
@@ -26,7 +34,9 @@ pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, Addresses
         joined.chip.clock = running.chip.clock;
     }
     let configured = &joined.gateway;
-    let zenoh = configured.zenoh.settings(args.zenoh.clone());
+    let zenoh = configured
+        .zenoh
+        .settings(args.zenoh.clone(), args.via.clone());
     let mut wanted = Addresses {
         metrics: args.metrics.or(configured.metrics),
         foxglove: args.foxglove.or(configured.foxglove),
@@ -56,7 +66,68 @@ pub fn run(bus: &Bus, config: &Config, wanted: Addresses, shutdown: &Shutdown) -
     let patience = TimeLimit::new(config, &Shutdown::new())?;
     let signs = RuntimeFolder::live_as(&config.bus()?, Service::Gateway)?;
     let watchdog = patience.watchdog.showing(signs);
-    Ok(gateway.run(bus, &watchdog, shutdown)?)
+    let stop_word = bus.home().folder_of(bus.unit()).join(StopPage::FILE);
+    Ok(gateway.run(bus, Some(stop_word), &watchdog, shutdown)?)
+}
+
+/// Shows figures and views of a robot elsewhere, from its own gateway.
+///
+/// # Errors
+/// An address is not free, or that gateway does not answer.
+pub fn run_from_afar(config: &Config, args: &GatewayArgs, shutdown: &Shutdown) -> Result<()> {
+    let endpoint = args.remote.as_ref().context("clap demands it")?;
+    let mut wanted = Addresses {
+        metrics: args.metrics,
+        foxglove: args.foxglove,
+        zenoh: None,
+    };
+    if wanted == Addresses::default() {
+        wanted.metrics = Some(USUAL_METRICS.parse().context("the usual address")?);
+    }
+    let robot = config.name.parse()?;
+    wanted.may_be_had(&robot).map_err(refused)?;
+    let remote = afar::call(config, endpoint, shutdown)?;
+    let gateway = Gateway::open(wanted, &robot)?;
+    for line in told(gateway.addresses()) {
+        console::print(&line)?;
+    }
+    // Nothing of a link can hang.
+    Ok(gateway.run(&remote, None, &Watchdog::default(), shutdown)?)
+}
+
+/// Runs a router until somebody ends it.
+///
+/// # Errors
+/// It cannot listen there.
+#[cfg(feature = "zenoh")]
+pub fn route(config: &Config, args: &GatewayArgs, shutdown: &Shutdown) -> Result<()> {
+    let endpoint = args.router.as_ref().context("clap demands it")?;
+    let usage = |error: lager_remote::SettingsError| exit::Usage(error.to_string());
+    let zenoh = ZenohSection {
+        router: None,
+        ..config.gateway.zenoh.clone()
+    };
+    let settings = zenoh
+        .settings(Some(endpoint.clone()), None)
+        .map_err(usage)?;
+    let proof = settings.and_then(|settings| settings.proof);
+    let _router = lager_remote::Router::open(endpoint, &args.robots, proof.as_ref())?;
+    console::print(&format!(
+        "robots and listeners with Zenoh connect to {endpoint}"
+    ))?;
+    while !shutdown.is_requested() {
+        std::thread::sleep(LOOK);
+    }
+    Ok(())
+}
+
+/// This program cannot.
+///
+/// # Errors
+/// Always, as it was built without the feature `zenoh`.
+#[cfg(not(feature = "zenoh"))]
+pub fn route(_config: &Config, _args: &GatewayArgs, _shutdown: &Shutdown) -> Result<()> {
+    Err(refused(GatewayError::NoZenoh))
 }
 
 /// Checks, before anything runs, whether a gateway of `up` could work. Returns where it will
@@ -88,11 +159,13 @@ fn told(at: &Addresses) -> Vec<String> {
         .foxglove
         .map(|at| reach::listed(at, |at| format!("ws://{at}")))
         .map(|at| format!("Foxglove opens a connection to {at}"));
-    let zenoh = at.zenoh.as_ref().map(|settings| {
-        let endpoint = &settings.endpoint;
-        format!("listeners with Zenoh connect to {endpoint}")
-    });
-    metrics.into_iter().chain(foxglove).chain(zenoh).collect()
+    let zenoh = at.zenoh.as_ref();
+    let listens = zenoh.and_then(|settings| settings.endpoint.as_ref());
+    let listens = listens.map(|at| format!("listeners with Zenoh connect to {at}"));
+    let router = zenoh.and_then(|settings| settings.router.as_ref());
+    let router = router.map(|at| format!("samples go to the router at {at}"));
+    let all = [metrics, foxglove, listens, router];
+    all.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ pub fn run(args: &KeysArgs) -> Result<String> {
         KeysCommand::Authority => Holder::Authority,
         KeysCommand::Robot { robot, address } => Holder::Robot(robot, address),
         KeysCommand::Listener { listener } => Holder::Listener(listener),
+        KeysCommand::Router { address } => Holder::Router(address),
     };
     let made = make(&args.folder, holder, args.days)?;
     let (certificate, key) = (made.certificate.display(), made.key.display());
@@ -33,6 +34,5 @@ pub fn run(args: &KeysArgs) -> Result<String> {
 /// Always, as it was built without the feature `zenoh`.
 #[cfg(not(feature = "zenoh"))]
 pub fn run(_args: &KeysArgs) -> Result<String> {
-    let what = lager_gateway::GatewayError::NoZenoh.to_string();
-    Err(crate::exit::Usage(what).into())
+    Err(crate::afar::without())
 }

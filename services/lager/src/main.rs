@@ -7,6 +7,7 @@
 )]
 
 mod address;
+mod afar;
 mod bag;
 mod bench;
 mod board;
@@ -247,6 +248,14 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         }
         Command::Gateway(args) if args.ros2 => {
             return Err(ros2::become_it(&config, &args, &cli.global)?);
+        }
+        Command::Gateway(args) if args.router.is_some() => {
+            gateway::route(&config, &args, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Command::Gateway(args) if args.remote.is_some() => {
+            gateway::run_from_afar(&config, &args, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
         }
         Command::Gateway(args) => {
             let (running, wanted) = gateway::prepare(&config, &args)?;

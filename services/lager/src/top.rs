@@ -1,17 +1,17 @@
-//! `lager top`: joins the bus, or reads a recording, for the monitor's screen.
+//! `lager top`: joins the bus, calls a robot's gateway, or reads a recording, for the monitor's screen.
 
 use std::io::{BufWriter, IsTerminal, Write};
 use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use lager_monitor::{Lacking, Load, Recorded, ToolError, Tools, TopConfig};
+use lager_monitor::{Lacking, Load, Origin, Recorded, ToolError, Tools, TopConfig};
 use lager_topics::Role;
 
 use crate::cli::TopArgs;
 use crate::config::Config;
 use crate::time_limit::TimeLimit;
-use crate::{diagnose, exit, overload, topic};
+use crate::{afar, diagnose, exit, overload, topic};
 
 /// How long to measure for the one picture.
 const ONCE: Duration = Duration::from_secs(2);
@@ -25,11 +25,26 @@ pub fn run(config: &Config, args: &TopArgs, patience: &TimeLimit) -> Result<()> 
     if let Some(file) = &args.bag {
         return over(file, args, patience);
     }
+    if let Some(endpoint) = &args.remote {
+        let remote = afar::call_quietly(config, endpoint, &patience.shutdown)?;
+        // Only the robot's own load would say something of it.
+        return show(&remote, Load::default, config, args, patience);
+    }
     diagnose::must_be_up(config)?;
     let bus = topic::join(config, Role::Monitor, &patience.watchdog)?;
+    show(&bus, load, config, args, patience)
+}
+
+fn show(
+    place: &impl Origin,
+    load: fn() -> Load,
+    config: &Config,
+    args: &TopArgs,
+    patience: &TimeLimit,
+) -> Result<()> {
     let out = &mut BufWriter::new(std::io::stdout());
     let mut tools = Tools {
-        place: &bus,
+        place,
         watchdog: &patience.watchdog,
         shutdown: &patience.shutdown,
         as_json: args.json,

@@ -4,11 +4,9 @@ use std::io::{BufWriter, Write};
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use anyhow::{Context, Result, anyhow};
-use lager_monitor::{EchoConfig, Payloads, PublishError, Publishing, ToolError, Tools};
-use lager_ports::Bus;
+use lager_monitor::{EchoConfig, Origin, Payloads, PublishError, Publishing, ToolError, Tools};
+use lager_ports::{Bus, Place};
 use lager_remote::Endpoint;
-#[cfg(feature = "zenoh")]
-use lager_remote::Remote;
 use lager_topics::{Role, TOPICS, UnknownTopic};
 use lager_wake::Watchdog;
 use serde_json::Value;
@@ -17,7 +15,7 @@ use crate::cli::{TopicArgs, TopicCommand};
 use crate::config::Config;
 use crate::meant::unknown_topic;
 use crate::time_limit::TimeLimit;
-use crate::{diagnose, exit};
+use crate::{afar, diagnose, exit};
 
 /// How many payloads are read before the tool publishes them.
 const READ_AHEAD: usize = 16;
@@ -29,8 +27,8 @@ pub fn run(
     every_robot: bool,
     patience: &TimeLimit,
 ) -> Result<()> {
-    if let Some(endpoint) = &args.remote {
-        return from_afar(config, endpoint, &args, patience);
+    if let Some(endpoint) = args.remote.clone() {
+        return from_afar(config, &endpoint, args, patience);
     }
     if let TopicCommand::Echo { watch, .. }
     | TopicCommand::Hz { watch }
@@ -56,25 +54,16 @@ pub fn run(
     };
     let shown = match args.command {
         TopicCommand::List => {
-            let listed = tools.list(every_robot);
+            let listed = match every_robot {
+                true => tools.list_every_robot(),
+                false => tools.list(),
+            };
             // A name under which nothing is open belongs to nobody.
             if matches!(listed, Ok(0)) && !every_robot {
                 diagnose::must_be_up(config)?;
             }
             listed.map(drop)
         }
-        TopicCommand::Schema { .. } => unreachable!("it needs no bus"),
-        TopicCommand::Info { topic } => tools.info(&topic),
-        TopicCommand::Echo { watch, field } => {
-            let echo = EchoConfig {
-                fields: field,
-                limits: watch.until.limits(),
-            };
-            tools.echo(&watch.topic, &echo)
-        }
-        TopicCommand::Hz { watch } => tools.hz(&watch.topic, watch.until.limits()),
-        TopicCommand::Bw { watch } => tools.bandwidth(&watch.topic, watch.until.limits()),
-        TopicCommand::Delay { watch } => tools.delay(&watch.topic, watch.until.limits()),
         TopicCommand::Pub {
             topic,
             payload,
@@ -102,28 +91,24 @@ pub fn run(
             let refused = |error| refused(error, payload.is_some(), &bus, &patience.watchdog);
             return ended(published.map_err(refused), tools.out);
         }
+        command => look(&mut tools, command),
     };
     let as_usage = |error| as_usage(error, &bus, &patience.watchdog);
     ended(shown.map_err(as_usage), tools.out)
 }
 
 /// The tools over a robot's gateway.
-#[cfg(feature = "zenoh")]
 fn from_afar(
     config: &Config,
     endpoint: &Endpoint,
-    args: &TopicArgs,
+    args: TopicArgs,
     patience: &TimeLimit,
 ) -> Result<()> {
-    if let TopicCommand::Info { .. } | TopicCommand::Pub { .. } | TopicCommand::Schema { .. } =
-        args.command
-    {
-        let what = "--remote is for list, echo, hz, bw and delay; use the others on the robot";
+    if let TopicCommand::Pub { .. } = args.command {
+        let what = "--remote only listens; use `lager topic pub` on the robot";
         return Err(exit::Usage(what.to_owned()).into());
     }
-    let proof = config.gateway.zenoh.proof()?;
-    let robot = config.name.parse()?;
-    let remote = Remote::open(endpoint, &robot, proof.as_ref())?;
+    let remote = afar::call(config, endpoint, &patience.shutdown)?;
     let mut tools = Tools {
         place: &remote,
         watchdog: &patience.watchdog,
@@ -131,11 +116,22 @@ fn from_afar(
         as_json: args.json,
         out: &mut BufWriter::new(std::io::stdout().lock()),
     };
-    let shown = match &args.command {
-        TopicCommand::List => tools.list_carried(),
+    let shown = look(&mut tools, args.command);
+    let as_usage = |error| as_usage(error, &remote, &patience.watchdog);
+    ended(shown.map_err(as_usage), tools.out)
+}
+
+/// The tools that only look.
+fn look<W: Write, P: Origin>(
+    tools: &mut Tools<'_, W, P>,
+    command: TopicCommand,
+) -> Result<(), ToolError> {
+    match command {
+        TopicCommand::List => tools.list().map(drop),
+        TopicCommand::Info { topic } => tools.info(&topic),
         TopicCommand::Echo { watch, field } => {
             let echo = EchoConfig {
-                fields: field.clone(),
+                fields: field,
                 limits: watch.until.limits(),
             };
             tools.echo(&watch.topic, &echo)
@@ -143,26 +139,9 @@ fn from_afar(
         TopicCommand::Hz { watch } => tools.hz(&watch.topic, watch.until.limits()),
         TopicCommand::Bw { watch } => tools.bandwidth(&watch.topic, watch.until.limits()),
         TopicCommand::Delay { watch } => tools.delay(&watch.topic, watch.until.limits()),
-        TopicCommand::Info { .. } | TopicCommand::Pub { .. } | TopicCommand::Schema { .. } => {
-            unreachable!("it was refused")
-        }
-    };
-    let shown = shown.map_err(|error| match error {
-        ToolError::NoField(error) => exit::Usage(error.to_string()).into(),
-        error => anyhow::Error::from(error),
-    });
-    ended(shown, tools.out)
-}
-
-/// The tools over a robot's gateway, which this program cannot call.
-#[cfg(not(feature = "zenoh"))]
-fn from_afar(
-    _config: &Config,
-    _endpoint: &Endpoint,
-    _args: &TopicArgs,
-    _patience: &TimeLimit,
-) -> Result<()> {
-    Err(exit::Usage(lager_gateway::GatewayError::NoZenoh.to_string()).into())
+        TopicCommand::Schema { .. } => unreachable!("it needs no bus"),
+        TopicCommand::Pub { .. } => unreachable!("it does not only look"),
+    }
 }
 
 /// Joins the bus.
@@ -187,17 +166,17 @@ fn ended(shown: Result<()>, out: &mut impl Write) -> Result<()> {
 }
 
 /// An unknown field or topic makes no sense, whatever the robot does.
-fn as_usage(error: ToolError, bus: &Bus, watchdog: &Watchdog) -> anyhow::Error {
+fn as_usage(error: ToolError, place: &impl Place, watchdog: &Watchdog) -> anyhow::Error {
     match error {
         ToolError::NoField(error) => exit::Usage(error.to_string()).into(),
-        ToolError::Unknown(UnknownTopic(topic)) => anyhow!(unknown(&topic, bus, watchdog)),
+        ToolError::Unknown(UnknownTopic(topic)) => anyhow!(unknown(&topic, place, watchdog)),
         error => error.into(),
     }
 }
 
 /// Says that there is no such topic, and suggests one of the open topics.
-fn unknown(topic: &str, bus: &Bus, watchdog: &Watchdog) -> String {
-    let open = watchdog.over("listing the topics", || bus.topics());
+fn unknown(topic: &str, place: &impl Place, watchdog: &Watchdog) -> String {
+    let open = watchdog.over("listing the topics", || place.every_topic());
     let open: Vec<String> = open.into_iter().flatten().map(|topic| topic.name).collect();
     unknown_topic(topic, open.iter().map(String::as_str))
 }

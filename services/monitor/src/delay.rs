@@ -12,6 +12,9 @@
 //!    | written            |          read      |       one that came during the look
 //! ```
 //!
+//! Over a robot's gateway the clocks of both machines are compared by round trips. A delay between
+//! them that is smaller than the comparison is sure has no figure: `-` in text, null in JSON.
+//!
 //! `read` contains the time that the bus takes, as far as an observer can see it. `lager bench hop`
 //! measures how long a receiver takes that the bus wakes.
 
@@ -23,7 +26,7 @@ use lager_wake::Pace;
 use serde_json::{Value, json};
 
 use crate::measure::{Arrival, Gauge, Limits, Plan};
-use crate::tells::Tells;
+use crate::origin::Origin;
 use crate::{ToolError, Tools};
 
 /// The time between two looks. It is a fifth of the other tools' shortest one, so the wait is
@@ -33,7 +36,7 @@ const POLL: Duration = Duration::from_millis(1);
 /// Longer delays are not told apart, in ns: a minute.
 const LONGEST_NS: u64 = 60_000_000_000;
 
-impl<W: Write, P: Tells> Tools<'_, W, P> {
+impl<W: Write, P: Origin> Tools<'_, W, P> {
     /// `topic delay`: measures the delays of `name` until a limit or the shutdown.
     ///
     /// # Errors
@@ -46,7 +49,7 @@ impl<W: Write, P: Tells> Tools<'_, W, P> {
             needs_clock: true,
             gauge: |_| Delays::default(),
         };
-        self.measure(name, plan)
+        self.measure(name, &plan)
     }
 }
 
@@ -84,11 +87,22 @@ impl Stage {
         }
     }
 
-    fn as_json(&self) -> Value {
+    /// The figures that are not smaller than the clocks are unsure.
+    fn as_json(&self, unsure_ns: u64) -> Value {
+        let sure = |ns: u64| (ns >= unsure_ns).then_some(ns);
         json!({
-            "p50_ns": self.at(50.0), "p90_ns": self.at(90.0), "p99_ns": self.at(99.0),
-            "p999_ns": self.at(99.9), "max_ns": self.max(),
+            "p50_ns": sure(self.at(50.0)), "p90_ns": sure(self.at(90.0)),
+            "p99_ns": sure(self.at(99.0)), "p999_ns": sure(self.at(99.9)),
+            "max_ns": sure(self.max()),
         })
+    }
+}
+
+/// A figure in ms, if it is not smaller than the clocks are unsure.
+fn ms(ns: u64, unsure_ns: u64) -> String {
+    match ns >= unsure_ns {
+        true => format!("{:8.3}", ns as f64 / 1e6),
+        false => format!("{:>8}", "-"),
     }
 }
 
@@ -102,10 +116,13 @@ struct Delays {
     own_wait: Stage,
     /// From that moment until the observer had the sample; from the publication if it came later.
     read: Stage,
+    /// How far the last two may be wrong, at most.
+    unsure_ns: u64,
 }
 
 impl Gauge for Delays {
     fn add(&mut self, seen: &Arrival) {
+        self.unsure_ns = self.unsure_ns.max(seen.unsure_ns);
         let published = seen.stamp.publish_time_ns;
         self.samples += 1;
         self.written
@@ -123,29 +140,26 @@ impl Gauge for Delays {
 
     fn as_json(&self) -> Value {
         json!({
-            "source_to_publish": self.written.as_json(),
-            "publish_to_receive": self.read.as_json(),
-            "own_wait": self.own_wait.as_json(),
+            "source_to_publish": self.written.as_json(0),
+            "publish_to_receive": self.read.as_json(self.unsure_ns),
+            "own_wait": self.own_wait.as_json(self.unsure_ns),
+            "clock_unsure_ns": self.unsure_ns,
         })
     }
 
     fn as_text(&self) -> String {
-        let ms = |ns: u64| ns as f64 / 1e6;
-        let three = |stage: &Stage| {
-            format!(
-                "{:8.3} {:8.3} {:8.3}",
-                ms(stage.at(50.0)),
-                ms(stage.at(99.0)),
-                ms(stage.max())
-            )
+        let three = |stage: &Stage, unsure_ns: u64| {
+            [stage.at(50.0), stage.at(99.0), stage.max()]
+                .map(|ns| ms(ns, unsure_ns))
+                .join(" ")
         };
         format!(
-            "{:7} {}    {}    {:8.3} {:8.3}",
+            "{:7} {}    {}    {} {}",
             self.samples,
-            three(&self.written),
-            three(&self.read),
-            ms(self.own_wait.at(50.0)),
-            ms(self.own_wait.max()),
+            three(&self.written, 0),
+            three(&self.read, self.unsure_ns),
+            ms(self.own_wait.at(50.0), self.unsure_ns),
+            ms(self.own_wait.max(), self.unsure_ns),
         )
     }
 }
@@ -165,6 +179,7 @@ mod tests {
             },
             looked_ns,
             received_ns,
+            unsure_ns: 0,
         }
     }
 
@@ -179,5 +194,21 @@ mod tests {
         let mut delays = Delays::default();
         delays.add(&seen(1_000, 3_000, 2_500, 3_700));
         assert_eq!((delays.own_wait.max(), delays.read.max()), (0, 700));
+    }
+
+    #[test]
+    fn a_delay_that_the_clocks_cannot_tell_has_no_figure() {
+        let mut delays = Delays::default();
+        delays.add(&Arrival {
+            unsure_ns: 1_000,
+            ..seen(1_000, 3_000, 2_500, 3_700)
+        });
+        let json = delays.as_json();
+        assert_eq!(json["publish_to_receive"]["max_ns"], Value::Null);
+        assert_eq!(json["source_to_publish"]["max_ns"], 2_000);
+        assert_eq!(json["clock_unsure_ns"], 1_000);
+        delays.add(&seen(1_000, 3_000, 2_500, 103_000));
+        assert_eq!(delays.as_json()["publish_to_receive"]["max_ns"], 100_031);
+        assert!(delays.as_text().contains(" - "), "{}", delays.as_text());
     }
 }

@@ -2,14 +2,15 @@
 
 use std::io::Write;
 
-use lager_ports::Layout;
+use lager_ports::{Layout, TopicInfo};
 use lager_topics::{TOPICS, UnknownTopic};
 use serde_json::json;
 
+use crate::origin::Origin;
 use crate::{Count, ToolError, Tools};
 
 /// A topic's line in the list, with how many publishers, subscribers and observers it has.
-pub(crate) fn listed(name: &str, [publishers, subscribers, observers]: [usize; 3]) -> String {
+fn listed(name: &str, [publishers, subscribers, observers]: [usize; 3]) -> String {
     let publishers = Count(publishers, "publisher").to_string();
     let subscribers = Count(subscribers, "subscriber").to_string();
     let observers = Count(observers, "observer");
@@ -17,19 +18,35 @@ pub(crate) fn listed(name: &str, [publishers, subscribers, observers]: [usize; 3
 }
 
 impl<W: Write> Tools<'_, W> {
-    /// `topic list`: every open topic on the bus, of every robot or only of the tools' robot.
-    /// Returns how many there are.
+    /// `topic list` of every robot on the bus. Returns how many there are.
     ///
     /// # Errors
     /// The state of the bus cannot be read, or the output cannot be written.
-    pub fn list(&mut self, every_robot: bool) -> Result<usize, ToolError> {
+    pub fn list_every_robot(&mut self) -> Result<usize, ToolError> {
         let topics = self
             .watchdog
             .over("listing the topics", || self.place.topics())?;
-        let mut topics: Vec<_> = topics
-            .into_iter()
-            .filter(|topic| every_robot || topic.unit == *self.place.unit())
-            .collect();
+        self.print_list(topics, true)
+    }
+}
+
+impl<W: Write, P: Origin> Tools<'_, W, P> {
+    /// `topic list`: every open topic of the robot. Returns how many there are.
+    ///
+    /// # Errors
+    /// They cannot be listed, or the output cannot be written.
+    pub fn list(&mut self) -> Result<usize, ToolError> {
+        let topics = self
+            .watchdog
+            .over("listing the topics", || self.place.every_topic());
+        self.print_list(topics.map_err(Into::into)?, false)
+    }
+
+    fn print_list(
+        &mut self,
+        mut topics: Vec<TopicInfo>,
+        every_robot: bool,
+    ) -> Result<usize, ToolError> {
         topics.sort_by(|a, b| a.unit.cmp(&b.unit));
         let count = topics.len();
         if topics.is_empty() && !self.as_json {
@@ -73,13 +90,18 @@ impl<W: Write> Tools<'_, W> {
             return self.info_of_found(name);
         };
         let layout = entry.layout;
-        let live = self
+        let topics = self
             .watchdog
-            .over("looking at the topic", || {
-                self.place.topics_of(self.place.unit())
-            })
-            .into_iter()
-            .find(|topic| topic.name == name);
+            .over("looking at the topic", || self.place.every_topic());
+        let topics = topics.map_err(Into::into)?;
+        let live = topics.into_iter().find(|topic| topic.name == name);
+        if live
+            .as_ref()
+            .is_some_and(|live| live.layout == Layout::Described)
+        {
+            // The robot is of another build.
+            return self.info_of_found(name);
+        }
         let (publishers, subscribers) = live
             .as_ref()
             .map_or((0, 0), |topic| (topic.publishers, topic.subscribers));
@@ -164,9 +186,9 @@ impl<W: Write> Tools<'_, W> {
     fn info_of_found(&mut self, name: &str) -> Result<(), ToolError> {
         let topics = self
             .watchdog
-            .over("looking at the topic", || self.place.topics())?;
-        let mut topics = topics.into_iter();
-        let topic = topics.find(|topic| topic.unit == *self.place.unit() && topic.name == name);
+            .over("looking at the topic", || self.place.every_topic());
+        let mut topics = topics.map_err(Into::into)?.into_iter();
+        let topic = topics.find(|topic| topic.name == name);
         let described = topic.and_then(|mut topic| Some((topic.description.take()?, topic)));
         let (description, topic) = described.ok_or_else(|| UnknownTopic(name.to_owned()))?;
         let (publishers, subscribers) = (topic.publishers, topic.subscribers);
@@ -180,7 +202,7 @@ impl<W: Write> Tools<'_, W> {
             return Ok(());
         }
         let size = Count(description.size(), "byte");
-        writeln!(self.out, "{name}: in no table of this build")?;
+        writeln!(self.out, "{name}: not as in a table of this build")?;
         writeln!(self.out, "  carries     {}, {size}", description.name())?;
         writeln!(self.out, "    {}", fields.join(", "))?;
         let publishers = Count(publishers, "publisher");

@@ -4,15 +4,15 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::time::Instant;
 
-use lager_ports::{Found, Source};
+use lager_ports::Source;
 use lager_sample::{Description, Stamp, Topic};
-use lager_topics::{TopicVisitor, by_id};
+use lager_topics::{TopicVisitor, by_id, visit};
 use lager_wake::urgency;
 use serde_json::{Value, json};
 
 use crate::block::Blocks;
 use crate::measure::Limits;
-use crate::place::Place;
+use crate::origin::Origin;
 use crate::source::Shown;
 use crate::{Count, POLL, ToolError, Tools};
 
@@ -25,7 +25,24 @@ pub struct EchoConfig {
     pub limits: Limits,
 }
 
-impl<W: Write, P: Place> Tools<'_, W, P> {
+impl<W: Write, P: Origin> Tools<'_, W, P> {
+    /// `topic echo`: each sample of `name`, or some of its fields, until a limit or the shutdown.
+    ///
+    /// # Errors
+    /// No topic has that name, its samples have no such field, it cannot be read, or the output
+    /// cannot be written.
+    pub fn echo(&mut self, name: &str, config: &EchoConfig) -> Result<(), ToolError> {
+        let tools = &mut *self;
+        if let Ok(Some(echoed)) = visit(name, Echo { tools, config }) {
+            return echoed;
+        }
+        let found = self.described(name)?;
+        let description = found.description();
+        must_have(&description, config)?;
+        let blocks = Blocks::of_found(name, &description)?;
+        self.echo_from(name, found, blocks, config)
+    }
+
     /// The writer in words: its role if that is known, and its process.
     fn writer(&self, pid: u32) -> String {
         let looked = || self.place.role_of(pid);
@@ -36,44 +53,34 @@ impl<W: Write, P: Place> Tools<'_, W, P> {
     }
 }
 
-impl<W: Write> Tools<'_, W> {
-    /// Shows a topic that carries its own description.
-    pub(crate) fn echo_found(
-        &mut self,
-        name: &str,
-        found: Found,
-        config: &EchoConfig,
-    ) -> Result<(), ToolError> {
-        must_have(found.description(), config)?;
-        let blocks = Blocks::of_found(found.name(), found.description())?;
-        self.echo_from(name, found, blocks, config)
-    }
+struct Echo<'a, 'b, W, P> {
+    tools: &'a mut Tools<'b, W, P>,
+    config: &'a EchoConfig,
 }
 
-pub(crate) struct Echo<'a, 'b, W> {
-    pub(crate) tools: &'a mut Tools<'b, W>,
-    pub(crate) config: &'a EchoConfig,
-}
-
-pub(crate) fn must_have(description: &Description, config: &EchoConfig) -> Result<(), ToolError> {
+fn must_have(description: &Description, config: &EchoConfig) -> Result<(), ToolError> {
     let mut fields = config.fields.iter();
     Ok(fields.try_for_each(|field| description.must_have(field))?)
 }
 
-impl<W: Write> TopicVisitor for Echo<'_, '_, W> {
-    type Output = Result<(), ToolError>;
+impl<W: Write, P: Origin> TopicVisitor for Echo<'_, '_, W, P> {
+    /// `None` if the topic has another layout than this program's.
+    type Output = Option<Result<(), ToolError>>;
 
     fn visit<T: Topic>(self) -> Self::Output {
-        must_have(&Description::of::<T::Payload>(), self.config)?;
-        let subscriber = self.tools.subscriber::<T>()?;
-        let blocks = Blocks::new::<T>()?;
-        self.tools
-            .echo_from(T::NAME, subscriber, blocks, self.config)
+        let (tools, config) = (self.tools, self.config);
+        let opened = must_have(&Description::of::<T::Payload>(), config)
+            .and_then(|()| Ok((tools.typed::<T>()?, Blocks::new::<T>()?)));
+        match opened {
+            Ok((Some(from), blocks)) => Some(tools.echo_from(T::NAME, from, blocks, config)),
+            Ok((None, _)) => None,
+            Err(error) => Some(Err(error)),
+        }
     }
 }
 
-impl<W: Write, P: Place> Tools<'_, W, P> {
-    pub(crate) fn echo_from(
+impl<W: Write, P: Origin> Tools<'_, W, P> {
+    fn echo_from(
         &mut self,
         name: &str,
         mut from: impl Source,
@@ -93,7 +100,7 @@ impl<W: Write, P: Place> Tools<'_, W, P> {
             };
             let payload = payload?;
             heard = Instant::now();
-            let received_ns = self.place.now_ns();
+            let received_ns = self.place.time().after(stamp.publish_time_ns);
             if self.as_json {
                 let value = json!({
                     "topic": name, "sequence": stamp.sequence, "epoch": stamp.epoch,

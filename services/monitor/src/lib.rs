@@ -5,8 +5,8 @@
 //! `pub` moves no robot by mistake: it holds the locks of the robot's name and of its bridge. If
 //! the robot is up, it needs `--live`, and then writes only topics that several programs may write.
 //!
-//! Where samples come from is a [`Place`]: the bus, or with the feature `zenoh` a robot's gateway on
-//! another computer (`remote.rs`). The tools are the same.
+//! Where samples come from is an [`Origin`]: the bus, or with the feature `zenoh` a robot's gateway on
+//! another computer. The tools are the same.
 //!
 //! All tools but `pub` are observers: they poll, hold no listener and never slow the path. They
 //! know no topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`.
@@ -20,16 +20,14 @@ mod delay;
 mod describe;
 mod durations;
 mod echo;
+mod life;
 mod measure;
-mod place;
+mod origin;
 mod publish;
 mod python;
 mod rate;
-#[cfg(feature = "zenoh")]
-mod remote;
 mod sentence;
 mod source;
-mod tells;
 mod top;
 
 use std::fmt;
@@ -37,17 +35,17 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use lager_home::Shortage;
-use lager_ports::{Bus, Found, IntrospectError, Look, PortError, ReceiveError, Source, Subscriber};
+use lager_ports::{Bus, IntrospectError, Look, PortError, ReceiveError, Source};
 use lager_sample::{NoField, Topic};
 use lager_topics::UnknownTopic;
 use lager_wake::{Shutdown, Watchdog};
 
 pub use echo::EchoConfig;
+pub use life::{Failing, Life};
 pub use measure::Limits;
-pub use place::Place;
+pub use origin::Origin;
 pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
-pub use tells::Tells;
 pub use top::{Lacking, Load, Recorded, TopConfig, leave_screen};
 
 /// How often `topic echo` and `top` look.
@@ -68,22 +66,30 @@ pub struct Tools<'a, W, P = Bus> {
     pub out: &'a mut W,
 }
 
-impl<W: Write> Tools<'_, W> {
-    fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, ToolError> {
-        let open = || self.place.subscriber();
-        Ok(self.watchdog.over("opening the topic", open)?)
+impl<W: Write, P: Origin> Tools<'_, W, P> {
+    /// Opens a topic of the table, with the type that this program has for it; `None` if its layout
+    /// is another one where the samples come from.
+    fn typed<T: Topic>(&self) -> Result<Option<P::Typed<T>>, ToolError> {
+        let open = || self.place.typed();
+        let opened = self.watchdog.over("opening the topic", open);
+        opened.map_err(Into::into)
     }
 
-    /// Opens a topic that is not in the table but on the bus.
-    fn found(&self, name: &str, unknown: UnknownTopic) -> Result<Found, ToolError> {
-        let found = self
-            .watchdog
-            .over("opening the topic", || self.place.found(name))?;
-        found.ok_or(ToolError::Unknown(unknown))
+    /// Opens a topic by what it says of itself.
+    fn described(&self, name: &str) -> Result<P::Found, ToolError> {
+        let open = || self.place.described(name);
+        let found = self.watchdog.over("opening the topic", open);
+        let unknown = || ToolError::Unknown(UnknownTopic(name.to_owned()));
+        found.map_err(Into::into)?.ok_or_else(unknown)
     }
-}
 
-impl<W: Write, P: Place> Tools<'_, W, P> {
+    fn must_still_tell(&self) -> Result<(), ToolError> {
+        match self.place.may_still_tell() {
+            true => Ok(()),
+            false => Err(ToolError::Cleared),
+        }
+    }
+
     fn receive<L: Look>(
         &self,
         from: &mut impl Source,
@@ -100,7 +106,7 @@ impl<W: Write, P: Place> Tools<'_, W, P> {
             if let Some(shortage) = Shortage::now() {
                 return Err(ToolError::Short(shortage));
             }
-            self.place.may_still_tell()?;
+            self.must_still_tell()?;
         }
         std::thread::sleep(pace);
         Ok(())
@@ -143,10 +149,10 @@ pub enum ToolError {
     #[cfg(feature = "zenoh")]
     #[error(transparent)]
     Remote(#[from] lager_remote::RemoteError),
-    /// The times of samples are of a clock that this machine does not have.
+    /// The times of samples are of a clock that this machine does not know.
     #[error(
-        "the robot is another machine, whose clock this one does not have, so delays between them \
-         cannot be told; run this tool on the robot"
+        "the robot's gateway does not tell its clock, so delays on the way cannot be told; use the \
+         same version on both machines, or run this tool on the robot"
     )]
     OtherClock,
     /// A sample could not be put into JSON.

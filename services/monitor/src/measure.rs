@@ -4,14 +4,13 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_home::Clock;
 use lager_ports::Source;
 use lager_sample::{Stamp, Topic};
-use lager_topics::TopicVisitor;
+use lager_topics::{TopicVisitor, visit};
 use lager_wake::Pace;
 use serde_json::{Value, json};
 
-use crate::place::Place;
+use crate::origin::Origin;
 use crate::source::Stamped;
 use crate::{ToolError, Tools};
 
@@ -44,6 +43,8 @@ pub(crate) struct Arrival {
     /// When the look began that found it.
     pub(crate) looked_ns: u64,
     pub(crate) received_ns: u64,
+    /// How far both may be wrong beside the stamp's times.
+    pub(crate) unsure_ns: u64,
 }
 
 /// Measures the samples of one window.
@@ -66,28 +67,51 @@ pub(crate) struct Plan<F> {
     pub(crate) pace: Pace,
     /// The head line; empty for none.
     pub(crate) head: &'static str,
-    /// Whether it compares stamps with this machine's clock, which a robot elsewhere has not.
+    /// Whether it compares stamps with the time of their arrival.
     pub(crate) needs_clock: bool,
     /// Makes a gauge for payloads of this many bytes.
     pub(crate) gauge: F,
 }
 
-impl<W: Write, P: Place> Tools<'_, W, P> {
-    pub(crate) fn measure_from<G: Gauge, F: Fn(usize) -> G>(
+impl<W: Write, P: Origin> Tools<'_, W, P> {
+    pub(crate) fn measure<G: Gauge, F: Fn(usize) -> G>(
+        &mut self,
+        name: &str,
+        plan: &Plan<F>,
+    ) -> Result<(), ToolError> {
+        if plan.needs_clock && self.place.time().unsure_ns == u64::MAX {
+            return Err(ToolError::OtherClock);
+        }
+        let tools = &mut *self;
+        if let Ok(Some(measured)) = visit(name, Measure { tools, plan }) {
+            return measured;
+        }
+        let found = self.described(name)?;
+        let size = found.description().size();
+        self.measure_from(name, size, found, plan)
+    }
+
+    fn measure_from<G: Gauge, F: Fn(usize) -> G>(
         &mut self,
         name: &str,
         size: usize,
         mut from: impl Source,
         plan: &Plan<F>,
     ) -> Result<(), ToolError> {
-        if plan.needs_clock && self.place.now_ns().is_none() {
-            return Err(ToolError::OtherClock);
-        }
         let began = Instant::now();
         let (mut total, mut lost, mut is_over) = (0, 0, false);
         let mut heard = began;
         let mut pace = plan.pace.clone();
         if !self.as_json && !plan.head.is_empty() {
+            let unsure_ns = self.place.time().unsure_ns;
+            if unsure_ns > 0 {
+                let ms = unsure_ns as f64 / 1e6;
+                writeln!(
+                    self.out,
+                    "the robot's clock is another one, known here to {ms:.3} ms; what is below that \
+                     is not told"
+                )?;
+            }
             writeln!(self.out, "{}", plan.head)?;
         }
         let mut gauge = (plan.gauge)(size);
@@ -98,14 +122,15 @@ impl<W: Write, P: Place> Tools<'_, W, P> {
                 if self.shutdown.is_requested() {
                     return Ok(());
                 }
-                let looked_ns = Clock::monotonic_ns();
+                let looked_ns = self.place.time().now_ns;
                 let so_far = total;
                 while !is_over && let Some(stamp) = self.receive(&mut from, Stamped)? {
-                    let received_ns = Clock::monotonic_ns();
+                    let now = self.place.time();
                     gauge.add(&Arrival {
                         stamp,
                         looked_ns,
-                        received_ns,
+                        received_ns: now.now_ns,
+                        unsure_ns: now.unsure_ns,
                     });
                     total += 1;
                     heard = Instant::now();
@@ -117,7 +142,8 @@ impl<W: Write, P: Place> Tools<'_, W, P> {
                     self.pause(heard, pace.wait())?;
                 }
             }
-            let newly_lost = from.lost() - lost;
+            // A loss over a link is taken back if the sample comes late.
+            let newly_lost = from.lost().saturating_sub(lost);
             lost = from.lost();
             if self.as_json {
                 let mut value = gauge.as_json();
@@ -137,18 +163,21 @@ impl<W: Write, P: Place> Tools<'_, W, P> {
     }
 }
 
-pub(crate) struct Measure<'a, 'b, W, F> {
-    pub(crate) tools: &'a mut Tools<'b, W>,
-    pub(crate) plan: &'a Plan<F>,
+struct Measure<'a, 'b, W, P, F> {
+    tools: &'a mut Tools<'b, W, P>,
+    plan: &'a Plan<F>,
 }
 
-impl<W: Write, G: Gauge, F: Fn(usize) -> G> TopicVisitor for Measure<'_, '_, W, F> {
-    type Output = Result<(), ToolError>;
+impl<W: Write, P: Origin, G: Gauge, F: Fn(usize) -> G> TopicVisitor for Measure<'_, '_, W, P, F> {
+    /// `None` if the topic has another layout than this program's.
+    type Output = Option<Result<(), ToolError>>;
 
     fn visit<T: Topic>(self) -> Self::Output {
-        let subscriber = self.tools.subscriber::<T>()?;
+        let from = match self.tools.typed::<T>() {
+            Ok(from) => from?,
+            Err(error) => return Some(Err(error)),
+        };
         let size = size_of::<T::Payload>();
-        self.tools
-            .measure_from(T::NAME, size, subscriber, self.plan)
+        Some(self.tools.measure_from(T::NAME, size, from, self.plan))
     }
 }

@@ -8,16 +8,16 @@ use lager_wake::Pace;
 use serde_json::{Value, json};
 
 use crate::measure::{Arrival, Gauge, Limits, Plan};
-use crate::tells::Tells;
+use crate::origin::Origin;
 use crate::{ToolError, Tools};
 
-impl<W: Write, P: Tells> Tools<'_, W, P> {
+impl<W: Write, P: Origin> Tools<'_, W, P> {
     /// `topic hz`: measures the rate of `name` until a limit or the shutdown.
     ///
     /// # Errors
     /// No topic has that name, it cannot be read, or the output cannot be written.
     pub fn hz(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
-        self.measure(name, plan(limits, |_| Rate::default()))
+        self.measure(name, &plan(limits, |_| Rate::default()))
     }
 
     /// `topic bw`: measures the bytes a second of `name`, stamps included, until a limit or the
@@ -30,7 +30,7 @@ impl<W: Write, P: Tells> Tools<'_, W, P> {
             payload,
             rate: Rate::default(),
         };
-        self.measure(name, plan(limits, gauge))
+        self.measure(name, &plan(limits, gauge))
     }
 }
 
@@ -179,6 +179,7 @@ mod tests {
             },
             looked_ns: received_ns,
             received_ns,
+            unsure_ns: 0,
         }
     }
 

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use lager_journal::WriteError;
-use lager_ports::{IntrospectError, PortError, ReceiveError};
+use lager_ports::{IntrospectError, PlaceError, PortError, ReceiveError};
 
 use crate::disk::{Fate, is_full};
 
@@ -102,6 +102,9 @@ pub enum RecordError {
     /// The state of the bus cannot be read.
     #[error(transparent)]
     Look(#[from] IntrospectError),
+    /// The place elsewhere where the samples come from says why.
+    #[error(transparent)]
+    Elsewhere(Box<dyn std::error::Error + Send + Sync>),
     /// The bus is another one now, so no sample will come any more.
     #[error("the bus was damaged and replaced since this recording began; start it again")]
     Cleared,
@@ -110,7 +113,22 @@ pub enum RecordError {
     Thread(io::Error),
 }
 
+impl From<PlaceError> for RecordError {
+    fn from(error: PlaceError) -> Self {
+        match error {
+            PlaceError::Open(error) => Self::Open(error),
+            PlaceError::Look(error) => Self::Look(error),
+            PlaceError::Elsewhere(error) => Self::Elsewhere(error),
+        }
+    }
+}
+
 impl RecordError {
+    /// The error of the place where samples come from.
+    pub(crate) fn of_place(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        PlaceError::of(error).into()
+    }
+
     pub(crate) fn create(path: &Path, error: io::Error) -> Self {
         let path = path.to_owned();
         match error.kind() {

@@ -1,12 +1,11 @@
-//! The thread that polls the bus: it turns samples into JSON and queues them for the keeper.
+//! The thread that polls the bus, or what a gateway has sent: it turns samples into JSON and queues them for the keeper.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use lager_home::{BusWatch, Clock};
 use lager_journal::{Envelope, EnvelopeSchema, Times};
-use lager_ports::{Bus, Layout, Look, PortError, ReceiveError, Source};
-use lager_sample::{Description, Stamp, Topic as TableTopic};
+use lager_ports::{Layout, Look, Place, ReceiveError, Source, StampTime};
+use lager_sample::{Stamp, Topic as TableTopic};
 use lager_topics::{TOPICS, TopicVisitor, visit};
 use lager_wake::{Pace, Watchdog};
 use serde::Serialize;
@@ -18,8 +17,8 @@ use crate::tally::{Item, QueueIn, Topic, Topics};
 const TURN: u64 = 1_024;
 
 /// All topics that it listens to.
-pub(crate) struct Listener<'a> {
-    pub(crate) bus: &'a Bus,
+pub(crate) struct Listener<'a, P: Place> {
+    pub(crate) place: &'a P,
     pub(crate) watchdog: &'a Watchdog,
     pub(crate) topics: Topics,
     /// The topics that the user wants; empty for all.
@@ -29,7 +28,7 @@ pub(crate) struct Listener<'a> {
     pub(crate) feeds: Vec<Box<dyn Feed>>,
     /// The topics that it listens to, or has found unreadable.
     pub(crate) known: BTreeSet<String>,
-    pub(crate) services: BusWatch,
+    pub(crate) watch: P::Watch,
 }
 
 /// Turns the times of stamps into times of the file.
@@ -42,8 +41,8 @@ pub(crate) struct Timing {
 }
 
 impl Timing {
-    fn of(self, stamp: &Stamp) -> Times {
-        let now = Clock::monotonic_ns().max(self.began_ns);
+    fn of(self, stamp: &Stamp, now: StampTime) -> Times {
+        let now = now.now_ns.saturating_add(now.unsure_ns).max(self.began_ns);
         let log = stamp.publish_time_ns.clamp(self.began_ns, now);
         Times {
             log: log.saturating_add_signed(self.offset_ns),
@@ -55,10 +54,15 @@ impl Timing {
 /// A topic that it listens to.
 pub(crate) trait Feed {
     /// Queues the new samples, and says how full the topic's queue was.
-    fn drain(&mut self, queue: &QueueIn, pace: &mut Pace) -> Result<(), RecordError>;
+    fn drain(
+        &mut self,
+        queue: &QueueIn,
+        pace: &mut Pace,
+        now: StampTime,
+    ) -> Result<(), RecordError>;
 }
 
-impl Listener<'_> {
+impl<P: Place> Listener<'_, P> {
     fn wants(&self, name: &str) -> bool {
         self.wanted.is_empty() || self.wanted.iter().any(|wanted| wanted == name)
     }
@@ -77,47 +81,46 @@ impl Listener<'_> {
             if !self.wants(entry.name) {
                 continue;
             }
-            self.known.insert(entry.name.to_owned());
             let opened = visit(entry.name, Open { listener: self });
             match opened.expect("a topic of the table") {
-                Ok(feed) => self.feeds.push(feed),
+                Ok(Some(feed)) => self.feeds.push(feed),
+                // It is not there, or as described; then it is found later.
+                Ok(None) => continue,
                 Err(error) if self.wanted.is_empty() => {
                     refused.push(format!("{} is not recorded: {error}", entry.name));
                 }
-                Err(error) => return Err(error.into()),
+                Err(error) => return Err(RecordError::of_place(error)),
             }
+            self.known.insert(entry.name.to_owned());
         }
         Ok(refused)
     }
 
-    /// Opens new topics of other programs. Returns why some cannot be recorded.
+    /// Opens new topics, most of them of other programs. Returns why some cannot be recorded.
     pub(crate) fn look_for_more(&mut self) -> Result<Vec<String>, RecordError> {
-        let mut refused = Vec::new();
-        if !self.services.has_changed(self.bus.home()) {
+        let (mut refused, place) = (Vec::new(), self.place);
+        if !place.has_changed(&mut self.watch) {
             return Ok(refused);
         }
-        let look = || self.bus.topics();
-        for topic in self.watchdog.over("listing the topics", look)? {
-            let is_new = topic.unit == *self.bus.unit()
-                && topic.entry.is_none()
-                && self.wants(&topic.name)
-                && !self.known.contains(&topic.name);
-            if !is_new {
+        let topics = self
+            .watchdog
+            .over("listing the topics", || place.every_topic());
+        for topic in topics.map_err(RecordError::of_place)? {
+            let name = topic.name;
+            if !self.wants(&name) || self.known.contains(&name) {
                 continue;
             }
-            let name = topic.name;
             self.known.insert(name.clone());
-            if topic.layout != Layout::Described {
+            if !matches!(topic.layout, Layout::Described | Layout::Ours) {
                 refused.push(format!(
                     "{name} is not recorded: it does not say how its samples are laid out"
                 ));
                 continue;
             }
-            let open = || self.bus.found(&name);
+            let open = || place.described(&name);
             match self.watchdog.over("opening the topic", open) {
                 Ok(Some(found)) => {
-                    let schema = EnvelopeSchema::of(found.description());
-                    let feed = self.feed(found, &name, schema);
+                    let feed = self.feed(found, &name);
                     self.feeds.push(feed);
                 }
                 // It disappeared meanwhile, and may come back.
@@ -140,20 +143,17 @@ impl Listener<'_> {
     /// Queues the new samples of every topic.
     pub(crate) fn drain(&mut self, pace: &mut Pace) -> Result<(), RecordError> {
         self.watchdog.enter("reading the topics");
+        let now = self.place.time();
         let drained = self
             .feeds
             .iter_mut()
-            .try_for_each(|feed| feed.drain(&self.queue, pace));
+            .try_for_each(|feed| feed.drain(&self.queue, pace, now));
         self.watchdog.leave();
         drained
     }
 
-    fn feed<S: Source + 'static>(
-        &self,
-        from: S,
-        name: &str,
-        schema: EnvelopeSchema,
-    ) -> Box<dyn Feed> {
+    fn feed<S: Source + 'static>(&self, from: S, name: &str) -> Box<dyn Feed> {
+        let schema = EnvelopeSchema::of(&from.description());
         let topic = Topic::new(name, schema, from.holds());
         let (place, topic) = self.topics.add(topic);
         Box::new(FeedOf {
@@ -165,18 +165,16 @@ impl Listener<'_> {
     }
 }
 
-struct Open<'a, 'b> {
-    listener: &'a Listener<'b>,
+struct Open<'a, 'b, P: Place> {
+    listener: &'a Listener<'b, P>,
 }
 
-impl TopicVisitor for Open<'_, '_> {
-    type Output = Result<Box<dyn Feed>, PortError>;
+impl<P: Place> TopicVisitor for Open<'_, '_, P> {
+    type Output = Result<Option<Box<dyn Feed>>, P::OpenError>;
 
     fn visit<T: TableTopic>(self) -> Self::Output {
-        let listener = self.listener;
-        let from = listener.bus.subscriber::<T>()?;
-        let schema = EnvelopeSchema::of(&Description::of::<T::Payload>());
-        Ok(listener.feed(from, T::NAME, schema))
+        let from = self.listener.place.typed::<T>()?;
+        Ok(from.map(|from| self.listener.feed(from, T::NAME)))
     }
 }
 
@@ -188,13 +186,19 @@ struct FeedOf<S> {
 }
 
 impl<S: Source> Feed for FeedOf<S> {
-    fn drain(&mut self, queue: &QueueIn, pace: &mut Pace) -> Result<(), RecordError> {
+    fn drain(
+        &mut self,
+        queue: &QueueIn,
+        pace: &mut Pace,
+        now: StampTime,
+    ) -> Result<(), RecordError> {
         let mut found = 0;
         while found < TURN {
             let packing = Packing {
                 place: self.place,
                 dropped: self.topic.count().dropped,
                 times: self.times,
+                now,
             };
             let Some(item) = self.from.next(packing).map_err(received)? else {
                 break;
@@ -220,6 +224,7 @@ struct Packing {
     place: usize,
     dropped: u64,
     times: Timing,
+    now: StampTime,
 }
 
 impl Look for Packing {
@@ -236,7 +241,7 @@ impl Look for Packing {
         serde_json::to_writer(&mut message, &envelope)?;
         Ok(Item {
             topic: self.place,
-            times: self.times.of(stamp),
+            times: self.times.of(stamp, self.now),
             sequence: stamp.sequence,
             lost,
             dropped: self.dropped,

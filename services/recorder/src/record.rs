@@ -7,9 +7,8 @@ use std::sync::mpsc::sync_channel;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use lager_home::{BusWatch, Clock};
 use lager_journal::{Calendar, Count, Start};
-use lager_ports::Bus;
+use lager_ports::{Place, Watched};
 use lager_wake::{Pace, Shutdown, Watchdog};
 
 use crate::config::RecordConfig;
@@ -71,13 +70,16 @@ pub struct Recorded {
     pub ended_by: Option<RecordError>,
 }
 
-/// Records until `shutdown` is requested, and calls `tell` once a second.
+/// Records the samples of `place` until `shutdown` is requested, and calls `tell` once a second.
+///
+/// From a gateway, a sample counts as lost wherever it was lost on its way: on the bus, by a limit of
+/// the rate, on the link, or while no gateway was there. Times are those of the robot.
 ///
 /// # Errors
 /// The file cannot be made, or a topic that the user has named cannot be opened. If a recording
 /// ends later, the reason is in [`Recorded::ended_by`].
-pub fn record(
-    bus: &Bus,
+pub fn record<P: Place>(
+    place: &P,
     watchdog: &Watchdog,
     shutdown: &Shutdown,
     config: &RecordConfig,
@@ -85,12 +87,13 @@ pub fn record(
 ) -> Result<Recorded, RecordError> {
     let began = Instant::now();
     let topics = Topics::default();
+    let time = place.time();
     let times = Timing {
-        offset_ns: Clock::unix_offset_ns(),
-        began_ns: Clock::monotonic_ns(),
+        offset_ns: time.unix_offset_ns,
+        began_ns: time.now_ns,
     };
     let start = Start {
-        robot: bus.unit().to_string(),
+        robot: place.unit().to_string(),
         part: 0,
         unix_offset_ns: times.offset_ns,
     };
@@ -123,7 +126,7 @@ pub fn record(
         }
     };
     let mut listener = Listener {
-        bus,
+        place,
         watchdog,
         topics: topics.clone(),
         wanted: &config.topics,
@@ -131,12 +134,12 @@ pub fn record(
         queue: to,
         feeds: Vec::new(),
         known: BTreeSet::new(),
-        services: BusWatch::of_services(),
+        watch: place.watch(Watched::Topics),
     };
     let mut calendar = Calendar::new(times.offset_ns);
     let mut stands = |refused: Vec<String>| {
-        let stamp_ns = Clock::monotonic_ns();
-        if let Some(step) = calendar.look(stamp_ns, Clock::unix_offset_ns()) {
+        let time = place.time();
+        if let Some(step) = calendar.look(time.now_ns, time.unix_offset_ns) {
             notes.step(step);
             notes.tell(set(&step, began_unix_ns));
         }
@@ -173,8 +176,8 @@ pub fn record(
     })
 }
 
-fn listen<R>(
-    listener: &mut Listener<'_>,
+fn listen<P: Place, R>(
+    listener: &mut Listener<'_, P>,
     shutdown: &Shutdown,
     is_over: impl Fn() -> bool,
     stands: &mut impl FnMut(Vec<String>) -> R,
@@ -185,7 +188,7 @@ fn listen<R>(
         listener.drain(&mut pace)?;
         if told.is_none_or(|told| told.elapsed() >= TELL) {
             told = Some(Instant::now());
-            if !listener.bus.is_listed() {
+            if !listener.place.may_still_tell() {
                 return Err(RecordError::Cleared);
             }
             refused.append(&mut listener.look_for_more()?);

@@ -4,6 +4,7 @@
 //! ```text
 //!   authority.pem, authority.key      signs the others; its key stays where it was made
 //!     ├─ r1.pem, r1.key               a robot: proves its name and addresses to those who call it
+//!     ├─ router.pem, router.key       a router, to which robots bring what they send
 //!     └─ dash.pem, dash.key           a listener: proves itself to a robot that it calls
 //! ```
 //!
@@ -20,8 +21,12 @@ use rcgen::{
 };
 use time::{Duration, OffsetDateTime};
 
+use crate::session;
+
 /// The file name of the authority, without its ending.
 pub const AUTHORITY: &str = "authority";
+/// The same of a router.
+const ROUTER: &str = "router";
 
 /// Whom a certificate is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +37,8 @@ pub enum Holder<'a> {
     Robot(&'a str, &'a [String]),
     /// A listener of this name.
     Listener(&'a str),
+    /// A router, which robots and listeners call at these addresses or host names.
+    Router(&'a [String]),
 }
 
 /// Why there is no certificate.
@@ -87,6 +94,7 @@ pub fn make(folder: &Path, holder: Holder<'_>, days: i64) -> Result<Made, Certif
     let name = match holder {
         Holder::Authority => AUTHORITY,
         Holder::Robot(name, _) | Holder::Listener(name) => name,
+        Holder::Router(_) => ROUTER,
     };
     let is_free = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     let is_name = (1..=24).contains(&name.len()) && name.chars().all(is_free);
@@ -102,25 +110,12 @@ pub fn make(folder: &Path, holder: Holder<'_>, days: i64) -> Result<Made, Certif
     let pair = KeyPair::generate()?;
     let mut wanted = match holder {
         Holder::Authority => authority(),
-        Holder::Robot(_, addresses) => {
-            let mut names = vec![
-                name.to_owned(),
-                "localhost".to_owned(),
-                "127.0.0.1".to_owned(),
-            ];
-            names.extend(
-                addresses
-                    .iter()
-                    .filter(|it| !names.contains(it))
-                    .cloned()
-                    .collect::<Vec<_>>(),
-            );
-            leaf(name, names, ExtendedKeyUsagePurpose::ServerAuth)?
-        }
+        Holder::Robot(_, addresses) => called_at(name, name, addresses)?,
+        Holder::Router(addresses) => called_at(session::ROUTER, name, addresses)?,
         Holder::Listener(_) => leaf(
             name,
             vec![name.to_owned()],
-            ExtendedKeyUsagePurpose::ClientAuth,
+            vec![ExtendedKeyUsagePurpose::ClientAuth],
         )?,
     };
     let now = OffsetDateTime::now_utc();
@@ -129,7 +124,7 @@ pub fn make(folder: &Path, holder: Holder<'_>, days: i64) -> Result<Made, Certif
     wanted.not_after = now + Duration::days(days);
     let certificate = match holder {
         Holder::Authority => wanted.self_signed(&pair)?,
-        Holder::Robot(..) | Holder::Listener(_) => {
+        Holder::Robot(..) | Holder::Listener(_) | Holder::Router(_) => {
             let key = Made::at(folder, AUTHORITY).key;
             let text = fs::read_to_string(&key).map_err(|error| match error.kind() {
                 io::ErrorKind::NotFound => CertificateError::NoAuthority(key.clone()),
@@ -198,14 +193,35 @@ fn authority() -> CertificateParams {
     params
 }
 
+/// For an end that is called, at its own machine and at these addresses. A robot also calls a router.
+fn called_at(
+    name: &str,
+    host: &str,
+    addresses: &[String],
+) -> Result<CertificateParams, CertificateError> {
+    let mut names = [host, "localhost", "127.0.0.1", "::1"]
+        .map(str::to_owned)
+        .to_vec();
+    for address in addresses {
+        if !names.contains(address) {
+            names.push(address.clone());
+        }
+    }
+    let usages = vec![
+        ExtendedKeyUsagePurpose::ServerAuth,
+        ExtendedKeyUsagePurpose::ClientAuth,
+    ];
+    leaf(name, names, usages)
+}
+
 fn leaf(
     name: &str,
     names: Vec<String>,
-    usage: ExtendedKeyUsagePurpose,
+    usages: Vec<ExtendedKeyUsagePurpose>,
 ) -> Result<CertificateParams, CertificateError> {
     let mut params = CertificateParams::new(names)?;
     params.distinguished_name = called(name);
-    params.extended_key_usages = vec![usage];
+    params.extended_key_usages = usages;
     params.use_authority_key_identifier_extension = true;
     Ok(params)
 }

@@ -5,6 +5,7 @@
 //! lager/r1/@layout/sensor/line      how its payload is laid out; answers queries
 //! lager/r1/@counts                  once a second what each topic has carried, and a sign of life
 //! lager/r1/@alive                   a liveliness token, which is there while the gateway is
+//! lager/r1/@time                    the robot's clocks at this moment; answers queries
 //! ```
 //!
 //! A part of a key that begins with `@` is met only by a key that names it, so whoever subscribes
@@ -16,6 +17,15 @@ use lager_home::UnitName;
 const LAYOUT: &str = "@layout";
 /// The longest name of a topic that is carried, in bytes.
 const LONGEST: usize = 200;
+
+/// The liveliness tokens of all robots.
+pub(crate) const EVERY_ALIVE: &str = "lager/*/@alive";
+
+/// The robot whose liveliness token this is; `None` for any other key.
+pub(crate) fn alive_of(key: &str) -> Option<UnitName> {
+    let name = key.strip_prefix("lager/")?.strip_suffix("/@alive")?;
+    name.parse().ok()
+}
 
 /// The keys of one robot.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,6 +69,22 @@ impl Keys {
     /// The liveliness token.
     pub fn alive(&self) -> String {
         format!("{}/@alive", self.robot)
+    }
+
+    /// The robot's clocks.
+    pub fn time(&self) -> String {
+        format!("{}/@time", self.robot)
+    }
+
+    /// All of these, for rules of access.
+    pub(crate) fn all(&self) -> [String; 5] {
+        [
+            self.topics(),
+            self.layouts(),
+            self.counts(),
+            self.alive(),
+            self.time(),
+        ]
     }
 
     /// The topic of a key that [`Keys::topic`] has made; `None` for other keys.
@@ -105,7 +131,11 @@ mod tests {
         );
         assert_eq!(keys.counts(), "lager/r1/@counts");
         assert_eq!(keys.alive(), "lager/r1/@alive");
+        assert_eq!(keys.time(), "lager/r1/@time");
         assert_eq!(keys.topics(), "lager/r1/**");
+        assert_eq!(alive_of(&keys.alive()), Some(UnitName::default()));
+        assert_eq!(alive_of("lager/r1/@alive/more"), None);
+        assert_eq!(alive_of("lager/R 1/@alive"), None);
         assert_eq!(keys.layouts(), "lager/r1/@layout/**");
     }
 

@@ -1,4 +1,4 @@
-//! The listener's end: [`Remote`], a connection to a robot's gateway, and [`Listening`], one topic.
+//! The listener's end of one topic: [`Listening`].
 //!
 //! ```text
 //!   Zenoh's thread ──> queue ──> Listening::next ──> the caller
@@ -9,16 +9,11 @@
 //! ledger shows it as any other loss of the link. After a gateway was replaced, Zenoh connects again
 //! by itself, and a state is asked for again.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use lager_home::UnitName;
-use lager_ports::{Look, ReceiveError, Source};
-use lager_sample::{Description, DescriptionError};
+use lager_ports::{Look, Raw, ReceiveError, Source};
+use lager_sample::Description;
 use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
@@ -26,252 +21,44 @@ use zenoh::query::{ConsolidationMode, Reply};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
-use crate::causes;
-use crate::endpoint::Endpoint;
+use crate::error::{LARGEST, PATIENCE, RemoteError};
 use crate::key::Keys;
 use crate::ledger::{Account, Heard, Ledger};
 use crate::note::{Note, layout_number};
-use crate::session::{self, ZenohError};
-use crate::settings::Proof;
-use crate::told::{About, Beat, boot};
+use crate::session::ZenohError;
+use crate::told::{About, Beat};
 
 /// How many messages of a topic wait for the caller.
 const QUEUE: usize = 4_096;
-/// How long a gateway has for an answer.
-const PATIENCE: Duration = Duration::from_secs(3);
-/// The largest payload that is read, in bytes. The largest of the robot's table is far smaller.
-const LARGEST: usize = 16 << 20;
 
-/// Why nothing can be heard of a robot.
-#[derive(Debug, thiserror::Error)]
-pub enum RemoteError {
-    /// TLS needs certificates.
-    #[error(
-        "{0} needs certificates; name authority, certificate and key of this listener in \
-         [gateway.zenoh], as `lager keys` makes them"
-    )]
-    NoProof(Endpoint),
-    /// A file of the certificates cannot be read.
-    #[error("cannot read {file}: {error}; `lager keys` makes it")]
-    Proof {
-        /// Which.
-        file: PathBuf,
-        /// Why.
-        error: std::io::Error,
-    },
-    /// There is no connection.
-    #[error(
-        "no connection to {endpoint}: {cause}; `lager gateway --zenoh ENDPOINT` on the robot says \
-         where it listens"
-    )]
-    Connect {
-        /// Where.
-        endpoint: Endpoint,
-        /// Why, in Zenoh's words if it has told no more.
-        cause: String,
-    },
-    /// The gateway is there and says nothing of this robot.
-    #[error(
-        "no gateway of the robot `{robot}` answers at {endpoint}: another robot is there, or its \
-         certificate is not that of `{robot}`; --name chooses another robot"
-    )]
-    Silent {
-        /// Which robot.
-        robot: UnitName,
-        /// Where.
-        endpoint: Endpoint,
-    },
-    /// The gateway does not carry the topic.
-    #[error("`{topic}` is not sent by the gateway of `{robot}`; it sends {}", .carried.join(", "))]
-    NotCarried {
-        /// Which.
-        topic: String,
-        /// Of which robot.
-        robot: UnitName,
-        /// What it carries.
-        carried: Vec<String>,
-    },
-    /// The layout is none.
-    #[error("`{topic}`: {error}")]
-    Layout {
-        /// Of which topic.
-        topic: String,
-        /// Why.
-        error: DescriptionError,
-    },
-    /// A payload would be too large.
-    #[error("`{topic}` has payloads of {bytes} bytes, more than {LARGEST}, and is not read")]
-    TooLarge {
-        /// Which.
-        topic: String,
-        /// How large.
-        bytes: usize,
-    },
-    /// Zenoh cannot.
-    #[error("Zenoh cannot: {0}")]
-    Zenoh(#[from] ZenohError),
+fn subscribe(
+    session: &Session,
+    keys: &Keys,
+    key: &str,
+    to: &SyncSender<Message>,
+) -> Result<[Subscriber<()>; 3], zenoh::Error> {
+    let samples = session.declare_subscriber(key.to_owned());
+    let samples = samples.callback(telling(to, Message::of)).wait()?;
+    let beats = session.declare_subscriber(keys.counts());
+    let beats = beats.callback(telling(to, |sample| Message::Beat(bytes(sample.payload()))));
+    let beats = beats.wait()?;
+    let token = session.liveliness();
+    let token = token.declare_subscriber(keys.alive()).history(true);
+    let token = token.callback(telling(to, |sample| match sample.kind() {
+        SampleKind::Put => Message::There,
+        SampleKind::Delete => Message::Gone,
+    }));
+    Ok([samples, beats, token.wait()?])
 }
 
-/// A connection to a robot's gateway.
-#[derive(Debug)]
-pub struct Remote {
-    session: Session,
-    keys: Keys,
-    robot: UnitName,
-    endpoint: Endpoint,
-    /// Whether the robot is this machine, so that its stamps are of this machine's clock.
-    is_here: AtomicBool,
-}
-
-impl Remote {
-    /// Connects to the gateway of `robot` at `endpoint`.
-    ///
-    /// # Errors
-    /// The certificates cannot be used, or there is no connection.
-    pub fn open(
-        endpoint: &Endpoint,
-        robot: &UnitName,
-        proof: Option<&Proof>,
-    ) -> Result<Self, RemoteError> {
-        if let Endpoint::Tls(_) = endpoint {
-            let proof = proof.ok_or_else(|| RemoteError::NoProof(endpoint.clone()))?;
-            for file in [&proof.authority, &proof.certificate, &proof.key] {
-                fs::read(file).map_err(|error| RemoteError::Proof {
-                    file: file.clone(),
-                    error,
-                })?;
-            }
-        }
-        let config = session::of_listener(endpoint, robot, proof);
-        causes::forget();
-        let session = session::open(&config).map_err(|error| RemoteError::Connect {
-            endpoint: endpoint.clone(),
-            cause: causes::told().map_or_else(|| error.to_string(), str::to_owned),
-        })?;
-        Ok(Self {
-            session,
-            keys: Keys::of(robot),
-            robot: robot.clone(),
-            endpoint: endpoint.clone(),
-            is_here: AtomicBool::new(false),
-        })
-    }
-
-    /// Whether the stamps are of this machine's clock, as the robot is this machine. Known when the
-    /// gateway has told its topics.
-    pub fn has_this_clock(&self) -> bool {
-        self.is_here.load(Ordering::Relaxed)
-    }
-
-    /// The part that a process plays on the robot, if it writes a topic that is carried.
-    pub fn role_of(&self, pid: u32) -> Option<String> {
-        let topics = self.topics().ok()?;
-        topics
-            .into_values()
-            .find_map(|mut about| about.writers.remove(&pid))
-    }
-
-    /// The robot.
-    pub fn robot(&self) -> &UnitName {
-        &self.robot
-    }
-
-    /// Every topic that the gateway carries, with what it tells of it.
-    ///
-    /// # Errors
-    /// No gateway of the robot answers.
-    pub fn topics(&self) -> Result<BTreeMap<String, About>, RemoteError> {
-        let replies = self
-            .session
-            .get(self.keys.layouts())
-            .consolidation(ConsolidationMode::None)
-            .timeout(PATIENCE)
-            .wait()
-            .map_err(ZenohError::of)?;
-        let mut found = BTreeMap::new();
-        for reply in replies {
-            if let Ok(sample) = reply.result()
-                && let Some(topic) = self.keys.layout_of(sample.key_expr())
-                && let Ok(about) = serde_json::from_slice::<About>(&sample.payload().to_bytes())
-            {
-                self.is_here.store(about.boot == boot(), Ordering::Relaxed);
-                found.insert(topic.to_owned(), about);
-            }
-        }
-        match found.is_empty() {
-            true => Err(RemoteError::Silent {
-                robot: self.robot.clone(),
-                endpoint: self.endpoint.clone(),
-            }),
-            false => Ok(found),
-        }
-    }
-
-    /// Listens to a topic.
-    ///
-    /// # Errors
-    /// The gateway does not carry it, or its layout cannot be read.
-    pub fn listen(&self, topic: &str) -> Result<Listening, RemoteError> {
-        let mut topics = self.topics()?;
-        let (Some(about), Some(key)) = (topics.remove(topic), self.keys.topic(topic)) else {
-            return Err(RemoteError::NotCarried {
-                topic: topic.to_owned(),
-                robot: self.robot.clone(),
-                carried: topics.into_keys().collect(),
-            });
-        };
-        let description =
-            Description::parse(&about.layout).map_err(|error| RemoteError::Layout {
-                topic: topic.to_owned(),
-                error,
-            })?;
-        let bytes = description.size();
-        if bytes > LARGEST {
-            let topic = topic.to_owned();
-            return Err(RemoteError::TooLarge { topic, bytes });
-        }
-        let (to, from) = sync_channel(QUEUE);
-        let subscribers = self.subscribe(&key, &to).map_err(ZenohError::of)?;
-        Ok(Listening {
-            topic: topic.to_owned(),
-            layout: layout_number(&about.layout),
-            is_state: about.state,
-            description,
-            ledger: Ledger::new(),
-            unreadable: None,
-            heard: None,
-            is_there: None,
-            key,
-            to,
-            from,
-            _subscribers: subscribers,
-            session: self.session.clone(),
-        })
-    }
-
-    fn subscribe(
-        &self,
-        key: &str,
-        to: &SyncSender<Message>,
-    ) -> Result<[Subscriber<()>; 3], zenoh::Error> {
-        let put = |to: &SyncSender<Message>, of: fn(&Sample) -> Message| {
-            let to = to.clone();
-            // If the caller is slow, this is lost, and the ledger shows it.
-            move |sample: Sample| drop(to.try_send(of(&sample)))
-        };
-        let samples = self.session.declare_subscriber(key.to_owned());
-        let samples = samples.callback(put(to, Message::of)).wait()?;
-        let beats = self.session.declare_subscriber(self.keys.counts());
-        let beats = beats.callback(put(to, |sample| Message::Beat(bytes(sample.payload()))));
-        let beats = beats.wait()?;
-        let token = self.session.liveliness();
-        let token = token.declare_subscriber(self.keys.alive()).history(true);
-        let token = token.callback(put(to, |sample| match sample.kind() {
-            SampleKind::Put => Message::There,
-            SampleKind::Delete => Message::Gone,
-        }));
-        Ok([samples, beats, token.wait()?])
-    }
+/// A callback that never waits for whoever reads the queue: what does not fit is lost, and for
+/// samples the ledger shows it.
+pub(crate) fn telling<T: Send + 'static>(
+    to: &SyncSender<T>,
+    of: fn(&Sample) -> T,
+) -> impl Fn(Sample) + Send + Sync + 'static {
+    let to = to.clone();
+    move |sample| drop(to.try_send(of(&sample)))
 }
 
 /// What Zenoh's threads tell the caller's.
@@ -291,7 +78,7 @@ impl Message {
     }
 }
 
-fn bytes(of: &ZBytes) -> Vec<u8> {
+pub(crate) fn bytes(of: &ZBytes) -> Vec<u8> {
     of.to_bytes().into_owned()
 }
 
@@ -315,13 +102,52 @@ pub struct Listening {
 }
 
 impl Listening {
+    /// Listens to `topic`, of which the gateway has told `about`.
+    ///
+    /// # Errors
+    /// Its layout cannot be read, or Zenoh cannot.
+    pub(crate) fn open(
+        session: &Session,
+        keys: &Keys,
+        (topic, key): (&str, String),
+        about: &About,
+    ) -> Result<Self, RemoteError> {
+        let description =
+            Description::parse(&about.layout).map_err(|error| RemoteError::Layout {
+                topic: topic.to_owned(),
+                error,
+            })?;
+        let bytes = description.size();
+        if bytes > LARGEST {
+            let topic = topic.to_owned();
+            return Err(RemoteError::TooLarge { topic, bytes });
+        }
+        let (to, from) = sync_channel(QUEUE);
+        let subscribers = subscribe(session, keys, &key, &to).map_err(ZenohError::of)?;
+        Ok(Self {
+            topic: topic.to_owned(),
+            layout: layout_number(&about.layout),
+            is_state: about.state,
+            description,
+            ledger: Ledger::new(),
+            unreadable: None,
+            heard: None,
+            is_there: None,
+            key,
+            to,
+            from,
+            _subscribers: subscribers,
+            session: session.clone(),
+        })
+    }
+
     /// The topic's name.
     pub fn topic(&self) -> &str {
         &self.topic
     }
 
     /// The layout of its samples.
-    pub fn description(&self) -> &Description {
+    pub fn layout(&self) -> &Description {
         &self.description
     }
 
@@ -426,7 +252,15 @@ impl Source for Listening {
         let lost = Source::lost(self);
         let described = self.description.read(&payload);
         let described = described.expect("as many bytes as the layout says");
-        Ok(Some(look.look(&note.stamp, lost, &described)))
+        let raw = Raw {
+            bytes: &payload,
+            typed: None,
+        };
+        Ok(Some(look.look_at(&note.stamp, lost, &described, raw)))
+    }
+
+    fn description(&self) -> Description {
+        self.description.clone()
     }
 
     fn lost(&self) -> u64 {

@@ -35,7 +35,7 @@ use crate::limit::{Limit, Verdict};
 use crate::note::{Counts, Note, layout_number};
 use crate::session::{self, ZenohError};
 use crate::settings::{Proof, Settings};
-use crate::told::{About, Beat, Kind, boot};
+use crate::told::{About, Beat, Ends, Kind, Time};
 
 /// How often it tells what it has counted.
 const BEAT: Duration = Duration::from_secs(1);
@@ -77,7 +77,7 @@ pub enum CarrierError {
     /// The certificate is not this robot's.
     #[error(
         "{file} names {named}, and this robot is `{robot}`, so no listener would believe it; \
-         `lager keys robot {robot}` makes one that names it"
+         `lager keys` makes one that names it"
     )]
     OtherRobot {
         /// The certificate.
@@ -85,18 +85,21 @@ pub enum CarrierError {
         /// What it names.
         named: String,
         /// The robot.
-        robot: UnitName,
+        robot: String,
     },
+    /// The certificate is not a router's.
+    #[error("{0} is no router's certificate; `lager keys router` makes one")]
+    NoRouter(PathBuf),
     /// The certificate holds no more, or not yet.
     #[error(
         "{0} has expired, or is not valid yet by this machine's clock; `lager keys` makes another"
     )]
     Expired(PathBuf),
     /// Zenoh cannot.
-    #[error("Zenoh cannot listen at {endpoint}: {error}")]
+    #[error("Zenoh cannot work at {endpoint}: {error}")]
     Zenoh {
         /// Where.
-        endpoint: Endpoint,
+        endpoint: String,
         /// Why.
         error: ZenohError,
     },
@@ -110,10 +113,17 @@ pub enum CarrierError {
 /// # Errors
 /// The address is taken, the file is no socket, or a certificate cannot be read or is not `robot`'s.
 pub fn may_be_had(settings: &Settings, robot: &UnitName) -> Result<(), CarrierError> {
-    let endpoint = &settings.endpoint;
-    if let (Endpoint::Tls(_), Some(proof)) = (endpoint, &settings.proof) {
-        proves(proof, robot)?;
+    let mut ways = [&settings.endpoint, &settings.router].into_iter().flatten();
+    if ways.any(|way| matches!(way, Endpoint::Tls(_)))
+        && let Some(proof) = &settings.proof
+    {
+        proves(proof, robot.as_str())?;
     }
+    settings.endpoint.as_ref().map_or(Ok(()), may_listen)
+}
+
+/// Refuses what could not be listened at.
+pub(crate) fn may_listen(endpoint: &Endpoint) -> Result<(), CarrierError> {
     let had = match endpoint {
         Endpoint::Tcp(at) | Endpoint::Tls(at) => free(at),
         // Zenoh removes what is there before it listens.
@@ -130,7 +140,8 @@ pub fn may_be_had(settings: &Settings, robot: &UnitName) -> Result<(), CarrierEr
     })
 }
 
-fn proves(proof: &Proof, robot: &UnitName) -> Result<(), CarrierError> {
+/// Refuses a certificate that does not name `robot` or holds no more.
+pub(crate) fn proves(proof: &Proof, robot: &str) -> Result<(), CarrierError> {
     let read = |file: &PathBuf| {
         fs::read(file).map_err(|error| CarrierError::Proof {
             file: file.clone(),
@@ -142,16 +153,28 @@ fn proves(proof: &Proof, robot: &UnitName) -> Result<(), CarrierError> {
     let file = proof.certificate.clone();
     let named = certificates::named(&read(&file)?);
     match named {
-        Some(Named { name, holds }) if name == robot.as_str() => match holds {
+        Some(Named { name, holds }) if name == robot => match holds {
             true => Ok(()),
             false => Err(CarrierError::Expired(file)),
         },
         other => Err(CarrierError::OtherRobot {
             file,
             named: other.map_or("nobody".to_owned(), |other| format!("`{}`", other.name)),
-            robot: robot.clone(),
+            robot: robot.to_owned(),
         }),
     }
+}
+
+/// The group of a socket's file may listen as well; nobody else.
+pub(crate) fn open_to_group(endpoint: &Endpoint) -> Result<(), CarrierError> {
+    let Some(file) = endpoint.file() else {
+        return Ok(());
+    };
+    let opened = fs::set_permissions(file, fs::Permissions::from_mode(0o660));
+    opened.map_err(|error| CarrierError::Listen {
+        endpoint: endpoint.clone(),
+        error,
+    })
 }
 
 fn free(at: &HostPort) -> io::Result<()> {
@@ -179,6 +202,8 @@ pub struct Carrier {
     shelf: Arc<Shelf>,
     beats: Publisher<'static>,
     beat: u64,
+    /// [`Beat::about`].
+    about: u64,
     next_beat: Instant,
     has_failed: bool,
     // What listeners find. It goes before the session does.
@@ -203,7 +228,7 @@ impl Found {
         to: &SyncSender<Query>,
     ) -> Result<Self, zenoh::Error> {
         let mut queries = Vec::new();
-        for key in [keys.topics(), keys.layouts()] {
+        for key in [keys.topics(), keys.layouts(), keys.time()] {
             let to = to.clone();
             let queryable = session
                 .declare_queryable(key)
@@ -243,7 +268,7 @@ struct Outlet {
 #[derive(Default)]
 struct Shelf(Mutex<HashMap<KeyExpr<'static>, Answer>>);
 
-#[derive(Clone)]
+#[derive(Clone, PartialEq)]
 struct Answer {
     payload: Vec<u8>,
     note: Option<Vec<u8>>,
@@ -254,8 +279,13 @@ impl Shelf {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn put(&self, key: KeyExpr<'static>, payload: Vec<u8>, note: Option<Vec<u8>>) {
-        self.lock().insert(key, Answer { payload, note });
+    /// Returns whether it was not there or another one.
+    fn put(&self, key: KeyExpr<'static>, payload: Vec<u8>, note: Option<Vec<u8>>) -> bool {
+        let answer = Answer { payload, note };
+        let mut shelf = self.lock();
+        let is_new = shelf.get(&key) != Some(&answer);
+        shelf.insert(key, answer);
+        is_new
     }
 
     fn answers(&self, to: &KeyExpr<'_>) -> Vec<(KeyExpr<'static>, Answer)> {
@@ -274,21 +304,21 @@ impl Carrier {
     /// It cannot listen there.
     pub fn open(settings: &Settings, robot: &UnitName) -> Result<Self, CarrierError> {
         may_be_had(settings, robot)?;
-        let endpoint = &settings.endpoint;
-        let config = session::of_robot(endpoint, settings.proof.as_ref());
+        let config = session::of_robot(settings);
+        let ways = [&settings.endpoint, &settings.router].into_iter().flatten();
         let failed = |error| CarrierError::Zenoh {
-            endpoint: endpoint.clone(),
+            endpoint: ways
+                .map(Endpoint::to_string)
+                .collect::<Vec<_>>()
+                .join(" and "),
             error,
         };
-        let session = session::open(&config).map_err(failed)?;
-        if let Some(file) = endpoint.file() {
-            // The group of the file may listen as well; nobody else.
-            fs::set_permissions(file, fs::Permissions::from_mode(0o660)).map_err(|error| {
-                CarrierError::Listen {
-                    endpoint: endpoint.clone(),
-                    error,
-                }
-            })?;
+        let session = match session::open(&config) {
+            Ok(session) => session,
+            Err(error) => return Err(failed(error)),
+        };
+        if let Some(endpoint) = &settings.endpoint {
+            open_to_group(endpoint)?;
         }
         let keys = Keys::of(robot);
         let shelf = Arc::new(Shelf::default());
@@ -300,9 +330,9 @@ impl Carrier {
             alive,
         } = found.map_err(|error| failed(ZenohError::of(error)))?;
         let answers = {
-            let shelf = Arc::clone(&shelf);
+            let (shelf, time) = (Arc::clone(&shelf), keys.time());
             let thread = std::thread::Builder::new().name("answers".to_owned());
-            let answers = thread.spawn(move || answer(&asked, &shelf));
+            let answers = thread.spawn(move || answer(&asked, &shelf, &time));
             answers.map_err(CarrierError::Thread)?
         };
         Ok(Self {
@@ -314,6 +344,7 @@ impl Carrier {
             shelf,
             beats,
             beat: 0,
+            about: 0,
             next_beat: Instant::now(),
             has_failed: false,
             alive: Some(alive),
@@ -353,12 +384,11 @@ impl Carrier {
             held: None,
         };
         self.outlets.insert(name.to_owned(), outlet);
-        self.tell_of(name, [0; 3], BTreeMap::new());
+        self.tell_of(name, Ends::default());
     }
 
-    /// Tells listeners how many publishers, subscribers and observers among these a topic has, and
-    /// which part each writing process plays.
-    pub fn tell_of(&mut self, name: &str, ends: [usize; 3], writers: BTreeMap<u32, String>) {
+    /// Tells listeners who is at the ends of a topic.
+    pub fn tell_of(&mut self, name: &str, ends: Ends) {
         let key = self
             .keys
             .layout(name)
@@ -366,19 +396,14 @@ impl Carrier {
         let (Some(key), Some(outlet)) = (key, self.outlets.get(name)) else {
             return;
         };
-        let [publishers, subscribers, observers] = ends;
         let about = About {
             layout: outlet.layout_text.clone(),
             state: outlet.is_state,
             rate: self.allowed.rate(name),
-            publishers,
-            subscribers,
-            observers,
-            writers,
-            boot: boot(),
+            ends,
         };
         let text = serde_json::to_vec(&about).expect("it is JSON");
-        self.shelf.put(key, text, None);
+        self.about += u64::from(self.shelf.put(key, text, None));
     }
 
     /// Takes a sample that was read from the bus, which had lost `lost` samples before it so far.
@@ -407,8 +432,8 @@ impl Carrier {
         }
     }
 
-    /// Sends what is due at this time: states that were held, and a beat.
-    pub fn tick(&mut self) {
+    /// Sends what is due at this time: states that were held, and a beat with the robot's own time.
+    pub fn tick(&mut self, robot: Duration) {
         let now_ns = Clock::monotonic_ns();
         for outlet in self.outlets.values_mut() {
             if outlet.limit.is_due(now_ns)
@@ -432,8 +457,8 @@ impl Carrier {
             run: self.run,
             number: self.beat,
             now_ns,
-            unix_offset_ns: Clock::unix_offset_ns(),
-            boot: boot(),
+            robot_ns: u64::try_from(robot.as_nanos()).unwrap_or(u64::MAX),
+            about: self.about,
             topics: outlets
                 .map(|(name, outlet)| (name.clone(), outlet.counts.into()))
                 .collect(),
@@ -503,9 +528,14 @@ impl Drop for Carrier {
     }
 }
 
-/// Answers queries until no more can come.
-fn answer(asked: &Receiver<Query>, shelf: &Shelf) {
+/// Answers queries until no more can come. Under `time` stand the clocks of the moment.
+fn answer(asked: &Receiver<Query>, shelf: &Shelf, time: &str) {
     for query in asked {
+        if query.key_expr().as_str() == time {
+            let now = serde_json::to_vec(&Time::now()).expect("it is JSON");
+            let _ = query.reply(time, now).wait();
+            continue;
+        }
         for (key, Answer { payload, note }) in shelf.answers(query.key_expr()) {
             // May wait for the asker; nobody but other askers waits with it.
             let _ = query.reply(key, payload).attachment(note).wait();

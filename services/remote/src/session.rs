@@ -13,10 +13,15 @@ use serde_json::{Value, json};
 use zenoh::{Config, Session, Wait};
 
 use crate::endpoint::Endpoint;
-use crate::settings::Proof;
+use crate::key::Keys;
+use crate::settings::{Proof, Settings};
 
 /// How many listeners one gateway serves at a time.
 const LISTENERS: usize = 64;
+/// How many robots and listeners one router serves at a time.
+const AT_A_ROUTER: usize = 4_096;
+/// What a router's certificate names. No robot can have this name.
+pub(crate) const ROUTER: &str = "@router";
 
 /// What a listener may ask of a gateway.
 const ASKS: [&str; 4] = [
@@ -29,52 +34,120 @@ const ASKS: [&str; 4] = [
 const TELLS: [&str; 4] = ["put", "reply", "liveliness_token", "declare_queryable"];
 
 /// The keys of all robots, and everything beside them that has no `@`.
-const KEYS: [&str; 4] = [
-    "**",
-    "lager/*/@layout/**",
-    "lager/*/@counts",
-    "lager/*/@alive",
-];
+fn keys_of_all() -> Vec<String> {
+    let mut keys = vec!["**".to_owned()];
+    let ours = ["@layout/**", "@counts", "@alive", "@time"];
+    keys.extend(ours.map(|key| format!("lager/*/{key}")));
+    keys
+}
 
 /// The robot's end.
-pub(crate) fn of_robot(endpoint: &Endpoint, proof: Option<&Proof>) -> Value {
+pub(crate) fn of_robot(settings: &Settings) -> Value {
     let mut config = common();
+    // A peer is there at once, also if its router is not yet.
     config["mode"] = json!("peer");
-    config["listen"] = json!({ "endpoints": [endpoint.to_string()], "exit_on_failure": true });
-    config["connect"] = json!({ "endpoints": [] });
+    let listens: Vec<String> = settings.endpoint.iter().map(Endpoint::to_string).collect();
+    config["listen"] = json!({ "endpoints": listens, "exit_on_failure": true });
+    let calls: Vec<String> = settings.router.iter().map(Endpoint::to_string).collect();
+    config["connect"] = json!({
+        "endpoints": calls, "timeout_ms": -1, "exit_on_failure": false, "retry": RETRY.json(),
+    });
     config["transport"]["unicast"] = json!({ "max_sessions": LISTENERS });
     // A listener is let in to listen. What else it sends is refused, and goes to no other one.
-    config["access_control"] = access(json!({ "id": "anybody" }), ("ingress", "egress"));
-    if let Some(proof) = proof {
+    config["access_control"] = access(&[Subject {
+        name: "anybody",
+        names: None,
+        ingress: &[&ASKS],
+        egress: &[&TELLS],
+        keys: keys_of_all(),
+    }]);
+    if let Some(proof) = &settings.proof {
         config["transport"]["link"]["tls"] = tls(proof);
-        let of_listener = &mut config["transport"]["link"]["tls"];
-        of_listener["listen_certificate"] = json!(proof.certificate);
-        of_listener["listen_private_key"] = json!(proof.key);
     }
     config
 }
 
-/// A listener's end, which calls the gateway of `robot`.
-pub(crate) fn of_listener(endpoint: &Endpoint, robot: &UnitName, proof: Option<&Proof>) -> Value {
+/// A router's end. Over TLS only `robots` may tell, each of itself, and whoever else has a certificate
+/// listens. Otherwise it serves programs of its own machine, which all may do both.
+pub(crate) fn of_router(endpoint: &Endpoint, robots: &[UnitName], proof: Option<&Proof>) -> Value {
+    let mut config = common();
+    config["mode"] = json!("router");
+    config["listen"] = json!({ "endpoints": [endpoint.to_string()], "exit_on_failure": true });
+    config["connect"] = json!({ "endpoints": [] });
+    config["transport"]["unicast"] = json!({ "max_sessions": AT_A_ROUTER });
+    let is_proved = matches!(endpoint, Endpoint::Tls(_));
+    let anybody = Subject {
+        name: "anybody",
+        names: None,
+        ingress: if is_proved {
+            &[&ASKS]
+        } else {
+            &[&ASKS, &TELLS]
+        },
+        egress: &[&ASKS, &TELLS],
+        keys: keys_of_all(),
+    };
+    let of_robot = |robot| Subject {
+        name: UnitName::as_str(robot),
+        names: Some(vec![robot.as_str()]),
+        ingress: &[&TELLS],
+        egress: &[],
+        keys: Keys::of(robot).all().to_vec(),
+    };
+    let robots = robots.iter().filter(|_| is_proved).map(of_robot);
+    let subjects: Vec<Subject<'_>> = robots.chain([anybody]).collect();
+    config["access_control"] = access(&subjects);
+    if let Some(proof) = proof {
+        config["transport"]["link"]["tls"] = tls(proof);
+    }
+    config
+}
+
+/// A listener's end, which calls the gateway of `robot`, or a router.
+pub(crate) fn of_listener(
+    endpoint: &Endpoint,
+    robot: Option<&UnitName>,
+    proof: Option<&Proof>,
+) -> Value {
     let mut config = common();
     config["mode"] = json!("client");
     config["listen"] = json!({ "endpoints": [] });
     config["connect"] = json!({
-        "endpoints": [endpoint.to_string()],
-        "timeout_ms": 0,
-        "exit_on_failure": true,
-        // After a gateway was replaced it is found again soon.
-        "retry": { "period_init_ms": 100, "period_max_ms": 1_000, "period_increase_factor": 2 },
+        "endpoints": [endpoint.to_string()], "timeout_ms": 0, "exit_on_failure": true,
+        "retry": RETRY.json(),
     });
     if let (Endpoint::Tls(_), Some(proof)) = (endpoint, proof) {
         config["transport"]["link"]["tls"] = tls(proof);
-        let of_caller = &mut config["transport"]["link"]["tls"];
-        of_caller["connect_certificate"] = json!(proof.certificate);
-        of_caller["connect_private_key"] = json!(proof.key);
-        let subject = json!({ "id": "robot", "cert_common_names": [robot.as_str()] });
-        config["access_control"] = access(subject, ("egress", "ingress"));
+        let named = robot.map(UnitName::as_str).into_iter().chain([ROUTER]);
+        config["access_control"] = access(&[Subject {
+            name: "robot",
+            names: Some(named.collect()),
+            ingress: &[&TELLS],
+            egress: &[&ASKS],
+            keys: keys_of_all(),
+        }]);
     }
     config
+}
+
+/// How soon the other end is called again: it is found soon after it was replaced.
+struct Retry {
+    first_ms: u32,
+    longest_ms: u32,
+}
+
+const RETRY: Retry = Retry {
+    first_ms: 100,
+    longest_ms: 1_000,
+};
+
+impl Retry {
+    fn json(&self) -> Value {
+        json!({
+            "period_init_ms": self.first_ms, "period_max_ms": self.longest_ms,
+            "period_increase_factor": 2,
+        })
+    }
 }
 
 fn common() -> Value {
@@ -94,24 +167,52 @@ fn tls(proof: &Proof) -> Value {
         "enable_mtls": true,
         "verify_name_on_connect": true,
         "close_link_on_expiration": true,
+        "listen_certificate": proof.certificate,
+        "listen_private_key": proof.key,
+        "connect_certificate": proof.certificate,
+        "connect_private_key": proof.key,
     })
 }
 
-/// Rules by which one end only asks and the other one only tells.
-fn access(subject: Value, (asks, tells): (&str, &str)) -> Value {
-    let rule = |id: &str, messages: [&str; 4], flow: &str| {
-        json!({
-            "id": id, "permission": "allow", "messages": messages, "flows": [flow],
-            "key_exprs": KEYS,
-        })
-    };
-    let name = subject["id"].clone();
+/// Whoever is at the other end, and what passes from there and to there.
+struct Subject<'a> {
+    name: &'a str,
+    /// The names in certificates; `None` for everybody.
+    names: Option<Vec<&'a str>>,
+    ingress: &'a [&'a [&'a str]],
+    egress: &'a [&'a [&'a str]],
+    keys: Vec<String>,
+}
+
+/// Rules by which nothing passes but this.
+fn access(subjects: &[Subject<'_>]) -> Value {
+    let (mut rules, mut policies) = (Vec::new(), Vec::new());
+    for subject in subjects {
+        let mut own = Vec::new();
+        for (flow, messages) in [("ingress", subject.ingress), ("egress", subject.egress)] {
+            let messages = messages.concat();
+            if messages.is_empty() {
+                continue;
+            }
+            let id = format!("{flow}-{}", subject.name);
+            rules.push(json!({
+                "id": id, "permission": "allow", "messages": messages, "flows": [flow],
+                "key_exprs": subject.keys,
+            }));
+            own.push(id);
+        }
+        policies.push(json!({ "rules": own, "subjects": [subject.name] }));
+    }
+    let subjects = subjects.iter().map(|subject| match &subject.names {
+        Some(names) => json!({ "id": subject.name, "cert_common_names": names }),
+        None => json!({ "id": subject.name }),
+    });
     json!({
         "enabled": true,
         "default_permission": "deny",
-        "rules": [rule("asks", ASKS, asks), rule("tells", TELLS, tells)],
-        "subjects": [subject],
-        "policies": [{ "rules": ["asks", "tells"], "subjects": [name] }],
+        "rules": rules,
+        "subjects": subjects.collect::<Vec<_>>(),
+        "policies": policies,
     })
 }
 

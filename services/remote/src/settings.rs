@@ -21,7 +21,9 @@ pub struct Proof {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Where it listens.
-    pub endpoint: Endpoint,
+    pub endpoint: Option<Endpoint>,
+    /// The router that it calls; listeners may be there.
+    pub router: Option<Endpoint>,
     /// Which topics it carries, and how often.
     pub allowed: Allowed,
     /// Its certificate, for TLS.
@@ -95,21 +97,26 @@ impl Proof {
 }
 
 impl Settings {
-    /// A gateway that listens at `endpoint`.
+    /// A gateway that listens at `endpoint` and calls `router`, or does one of both.
     ///
     /// # Errors
     /// It may not listen there, or it would need certificates.
     pub fn new(
-        endpoint: Endpoint,
+        endpoint: Option<Endpoint>,
+        router: Option<Endpoint>,
         allowed: Allowed,
         proof: Option<Proof>,
     ) -> Result<Self, SettingsError> {
-        endpoint.may_listen()?;
-        if matches!(endpoint, Endpoint::Tls(_)) && proof.is_none() {
+        if let Some(endpoint) = &endpoint {
+            endpoint.may_listen()?;
+        }
+        let is_tls = |way: &Option<Endpoint>| matches!(way, Some(Endpoint::Tls(_)));
+        if (is_tls(&endpoint) || is_tls(&router)) && proof.is_none() {
             return Err(SettingsError::NoProof);
         }
         Ok(Self {
             endpoint,
+            router,
             allowed,
             proof,
         })
@@ -127,7 +134,8 @@ mod tests {
         let file = || Some(PathBuf::from("a.pem"));
         let settings = |endpoint: &str, proof| {
             let allowed = Allowed::new(&["*".to_owned()], &BTreeMap::new()).expect("a list");
-            Settings::new(endpoint.parse().expect("an endpoint"), allowed, proof)
+            let endpoint = Some(endpoint.parse().expect("an endpoint"));
+            Settings::new(endpoint, None, allowed, proof)
         };
         let proof = Proof::of(file(), file(), file()).expect("all three");
         assert!(settings("tls/0.0.0.0:7447", proof).is_ok());

@@ -1,7 +1,8 @@
-//! What a gateway tells of itself beside samples, as JSON: [`About`] a topic, and [`Beat`].
+//! What a gateway tells of itself beside samples, as JSON: [`About`] a topic, [`Beat`] and [`Time`].
 
 use std::collections::BTreeMap;
 
+use lager_home::Clock;
 use serde::{Deserialize, Serialize};
 
 use crate::note::Counts;
@@ -26,16 +27,47 @@ pub struct About {
     pub state: bool,
     /// How many samples a second are sent at most; null if all are.
     pub rate: Option<f64>,
-    /// How many programs write the topic on the robot.
+    /// Who is at its ends on the robot.
+    pub ends: Ends,
+}
+
+/// Who writes and reads a topic on the robot.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Ends {
+    /// How many programs write it.
     pub publishers: usize,
-    /// How many read it there, the gateway among them.
+    /// How many read it, the gateway among them.
     pub subscribers: usize,
     /// How many of these only observe.
     pub observers: usize,
     /// The parts of the processes that write it, by process id.
     pub writers: BTreeMap<u32, String>,
-    /// [`Beat::boot`].
+    /// The parts of those that read it.
+    pub readers: BTreeMap<u32, String>,
+    /// The parts of those that each sample wakes.
+    pub woken: BTreeMap<u32, String>,
+}
+
+/// The answer under `@time`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Time {
+    /// The robot's `CLOCK_MONOTONIC` at the answer, in ns; stamps have this time.
+    pub now_ns: u64,
+    /// What has to be added to that for the time since 1970, in ns, by the robot's own calendar.
+    pub unix_offset_ns: i64,
+    /// Which machine's clock that is, for as long as it runs: Linux's boot id.
     pub boot: String,
+}
+
+impl Time {
+    /// Now, on this machine.
+    pub fn now() -> Self {
+        Self {
+            now_ns: Clock::monotonic_ns(),
+            unix_offset_ns: Clock::unix_offset_ns(),
+            boot: boot(),
+        }
+    }
 }
 
 /// What a gateway tells once a second.
@@ -47,12 +79,12 @@ pub struct Beat {
     pub run: u64,
     /// How many beats it has told before.
     pub number: u64,
-    /// The robot's `CLOCK_MONOTONIC` now, in ns; stamps have this time.
+    /// The robot's `CLOCK_MONOTONIC` now, in ns.
     pub now_ns: u64,
-    /// What has to be added to that for the time since 1970, in ns, by the robot's own clock.
-    pub unix_offset_ns: i64,
-    /// Which machine's clock that is, for as long as it runs: Linux's boot id.
-    pub boot: String,
+    /// The robot's own time at that moment, in ns: slower or faster, as `--speed` says.
+    pub robot_ns: u64,
+    /// How often what it tells of topics has changed in this run.
+    pub about: u64,
     /// What it has counted of each topic.
     pub topics: BTreeMap<String, Told>,
 }
@@ -91,7 +123,7 @@ impl From<Counts> for Told {
 }
 
 /// The identity of this machine since it started; empty if the system does not tell it.
-pub fn boot() -> String {
+pub(crate) fn boot() -> String {
     let id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
     id.trim().to_owned()
 }
@@ -113,17 +145,20 @@ mod tests {
             run: 5,
             number: 7,
             now_ns: 11,
-            unix_offset_ns: -13,
-            boot: "b".to_owned(),
+            robot_ns: 12,
+            about: 2,
             topics: [("sensor/line".to_owned(), counts.into())].into(),
         };
-        let text = r#"{"robot":"r1","run":5,"number":7,"now_ns":11,"unix_offset_ns":-13,"boot":"b","topics":{"sensor/line":{"next":3,"left_out":2,"lost":1}}}"#;
+        let text = r#"{"robot":"r1","run":5,"number":7,"now_ns":11,"robot_ns":12,"about":2,"topics":{"sensor/line":{"next":3,"left_out":2,"lost":1}}}"#;
         assert_eq!(serde_json::to_string(&beat).expect("JSON"), text);
         assert_eq!(serde_json::from_str::<Beat>(text).expect("a beat"), beat);
         assert_eq!(beat.counts("sensor/line"), Some(counts));
         assert_eq!(beat.counts("nav/map"), None);
-        let about = r#"{"layout":"A{a:u8}","state":true,"rate":null,"publishers":1,"subscribers":2,"observers":1,"writers":{"7":"bridge"},"boot":"b"}"#;
+        let about = r#"{"layout":"A{a:u8}","state":true,"rate":null,"ends":{"publishers":1,"subscribers":2,"observers":1,"writers":{"7":"bridge"},"readers":{},"woken":{"8":"logic"}}}"#;
         let read: About = serde_json::from_str(about).expect("it reads");
         assert_eq!(serde_json::to_string(&read).expect("JSON"), about);
+        let time = r#"{"now_ns":11,"unix_offset_ns":-13,"boot":"b"}"#;
+        let read: Time = serde_json::from_str(time).expect("it reads");
+        assert_eq!(serde_json::to_string(&read).expect("JSON"), time);
     }
 }

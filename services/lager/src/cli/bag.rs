@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
+use lager_remote::Endpoint;
 
 use super::values;
 
@@ -11,6 +12,8 @@ use super::values;
 #[command(after_help = "Examples:
   lager bag record                            everything, into ROBOT-DATE.mcap, until Ctrl-C
   lager bag record tour.mcap --topic sensor/line --topic steering/command
+  lager bag record --remote tls/192.168.1.4:7447                    a robot on another computer
+  lager bag record tours --remote tls/192.168.1.9:7447 --every-robot    all robots of a router
   lager bag info tour.mcap
   lager bag check tour.mcap
   lager bag recover tour.mcap                 what is whole of it, into tour.recovered.mcap
@@ -70,7 +73,8 @@ pub enum BagCommand {
 /// `lager bag record`.
 #[derive(Debug, Args)]
 pub struct RecordArgs {
-    /// The new file [default: ROBOT-DATE.mcap, or ROBOT-DATE-2.mcap if that exists]
+    /// The new file [default: ROBOT-DATE.mcap, or ROBOT-DATE-2.mcap if that exists]; with
+    /// --every-robot the folder in which each robot gets such a file
     pub file: Option<PathBuf>,
     /// Only this topic; may be given several times [default: all, also those that come later]
     #[arg(long, value_name = "TOPIC", value_parser = values::TopicName, hide_possible_values = true)]
@@ -87,6 +91,18 @@ pub struct RecordArgs {
     /// Wait for the robot if it is not up
     #[arg(long)]
     pub wait: bool,
+    /// Record a robot on another computer, at this endpoint of its `lager gateway --zenoh`
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        conflicts_with = "wait",
+        help_heading = "Robot"
+    )]
+    pub remote: Option<Endpoint>,
+    /// Record every robot whose gateway is at that endpoint of a `lager gateway --router`, also those
+    /// that come later
+    #[arg(long, requires = "remote", help_heading = "Robot")]
+    pub every_robot: bool,
 }
 
 /// `lager bag play`.

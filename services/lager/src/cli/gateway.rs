@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use clap::Args;
 use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS, USUAL_ZENOH};
+use lager_home::UnitName;
 use lager_remote::Endpoint;
 
 use super::{ServiceArgs, values};
@@ -19,6 +20,9 @@ use super::{ServiceArgs, values};
   lager up --metrics --foxglove --zenoh          all of it, started with the robot
   lager gateway --ros2                           a node of ROS 2, for programs of this machine
   lager gateway --ros2 --range subnet --operator    for the network, which may also order goods
+  lager gateway --metrics --remote tls/192.168.1.4:7447    figures of a robot elsewhere, here
+  lager gateway --router tls/192.168.1.9:7447 --robots r1,r2    where many robots bring their samples
+  lager gateway --via tls/192.168.1.9:7447       brings them there
 
 It only reads the bus. Everybody who reaches an address may read, without a password. Pages in a
 browser of that machine may read the live views as well. Ask for figures by an address in digits, not
@@ -53,6 +57,27 @@ pub struct GatewayArgs {
     /// How far the node is heard [default: ROS_AUTOMATIC_DISCOVERY_RANGE, or localhost]
     #[arg(long, value_name = "RANGE", requires = "ros2", value_parser = ["localhost", "subnet"], help_heading = "ROS 2")]
     pub range: Option<String>,
+    /// Bring the samples to the `lager gateway --router` at this endpoint as well [default: from the
+    /// configuration]
+    #[arg(long, value_name = "ENDPOINT", help_heading = "Outside")]
+    pub via: Option<Endpoint>,
+    /// Show a robot on another computer, at this endpoint of its `lager gateway --zenoh`, to programs
+    /// that reach this one
+    #[arg(long, value_name = "ENDPOINT", conflicts_with_all = ["zenoh", "via"], help_heading = "Robot")]
+    pub remote: Option<Endpoint>,
+    /// Be no robot's gateway but a router, where robots bring their samples and listeners get them;
+    /// without ENDPOINT at tcp/127.0.0.1:7447
+    #[arg(long, value_name = "ENDPOINT", num_args = 0..=1, default_missing_value = USUAL_ZENOH, conflicts_with_all = ["metrics", "foxglove", "zenoh", "via", "remote"], help_heading = "Router")]
+    pub router: Option<Endpoint>,
+    /// The robots that a router with certificates lets tell of themselves; all others only listen
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_delimiter = ',',
+        requires = "router",
+        help_heading = "Router"
+    )]
+    pub robots: Vec<UnitName>,
     /// What `up` tells every service
     #[command(flatten)]
     pub service: ServiceArgs,

@@ -10,6 +10,7 @@ use clap::{Args, Subcommand};
   lager keys authority                             once; keep keys/authority.key where you made it
   lager keys robot r1 --address 192.168.1.4        for the robot: authority.pem, r1.pem and r1.key
   lager keys listener dash                         for a listener: authority.pem, dash.pem and dash.key
+  lager keys router --address 192.168.1.9          for a router: authority.pem, router.pem, router.key
 
 Name the three files in [gateway.zenoh] of the configuration, on the robot and where you listen. Who
 has a key that this authority has signed may listen to all of its robots. Nothing is overwritten.")]
@@ -35,6 +36,12 @@ pub enum KeysCommand {
         /// The robot's name, as in the configuration
         robot: String,
         /// An address or a host name at which listeners call it; may be given several times
+        #[arg(long, value_name = "HOST")]
+        address: Vec<String>,
+    },
+    /// A router, to which robots bring what they send
+    Router {
+        /// An address or a host name at which robots and listeners call it; may be given several times
         #[arg(long, value_name = "HOST")]
         address: Vec<String>,
     },

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lager_remote::Endpoint;
 
 use super::values;
 
@@ -13,6 +14,7 @@ use super::values;
   lager top --filter sensor/
   lager top --once --json             for a program
   lager top --bag tour.mcap           the same table over a recording
+  lager top --remote tls/192.168.1.4:7447    a robot on another computer
 
 A topic that has lost samples in the last 30 seconds stands first, in red and with a `!`. The tool
 reads only the topics that it shows. Of a closed topic it shows writers and readers. It is an
@@ -33,4 +35,12 @@ pub struct TopArgs {
     /// Show a recording instead of a robot
     #[arg(long, value_name = "FILE", conflicts_with = "duration")]
     pub bag: Option<PathBuf>,
+    /// Look at a robot on another computer, at this endpoint of its `lager gateway --zenoh`
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        conflicts_with = "bag",
+        help_heading = "Robot"
+    )]
+    pub remote: Option<Endpoint>,
 }

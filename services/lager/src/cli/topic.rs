@@ -31,8 +31,8 @@ pub struct TopicArgs {
     /// Print JSON, one value in each line
     #[arg(long, global = true, help_heading = "Output")]
     pub json: bool,
-    /// Look at a robot on another computer, at this endpoint of its `lager gateway --zenoh`; for
-    /// list, echo, hz, bw and delay
+    /// Look at a robot on another computer, at this endpoint of its `lager gateway --zenoh`; for all
+    /// but pub
     #[arg(long, global = true, value_name = "ENDPOINT", help_heading = "Robot")]
     pub remote: Option<Endpoint>,
 }

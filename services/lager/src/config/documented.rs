@@ -279,6 +279,7 @@ mod tests {
                 foxglove: Some("127.0.0.1:8766".parse().expect("an address")),
                 zenoh: ZenohSection {
                     endpoint: Some("tls/0.0.0.0:7448".parse().expect("an endpoint")),
+                    router: Some("tls/192.168.1.9:7449".parse().expect("an endpoint")),
                     topics: vec!["sensor/*".into(), "nav/status".into()],
                     authority: Some("/etc/lager/ca.pem".into()),
                     certificate: Some("/etc/lager/r1.pem".into()),

@@ -36,6 +36,9 @@ section! {
         /// "unixsock-stream//run/lager/zenoh" for its users in the group of that file, or
         /// "tls/0.0.0.0:7447" for the network, with the three files below. Unset, nowhere.
         pub endpoint: Option<Endpoint> = None,
+        /// The `lager gateway --router` to which the samples are brought as well, such as
+        /// "tls/192.168.1.9:7447". Unset, none.
+        pub router: Option<Endpoint> = None,
         /// Which topics are sent: names, all below a name as in "sensor/*", or "*" for every topic.
         pub topics: Vec<String> = vec!["*".into()],
         /// For TLS: the certificate of the authority whose listeners are let in. `lager keys` makes
@@ -54,7 +57,11 @@ section! {
 impl GatewaySection {
     /// Whether `up` starts a gateway.
     pub fn is_wanted(&self) -> bool {
-        self.metrics.is_some() || self.foxglove.is_some() || self.zenoh.endpoint.is_some()
+        let ZenohSection {
+            endpoint, router, ..
+        } = &self.zenoh;
+        let has_zenoh = endpoint.is_some() || router.is_some();
+        self.metrics.is_some() || self.foxglove.is_some() || has_zenoh
     }
 
     /// The section in the form of the gateway.
@@ -65,24 +72,30 @@ impl GatewaySection {
         Ok(Addresses {
             metrics: self.metrics,
             foxglove: self.foxglove,
-            zenoh: self.zenoh.settings(None)?,
+            zenoh: self.zenoh.settings(None, None)?,
         })
     }
 }
 
 impl ZenohSection {
-    /// The section in the form of the gateway, with another endpoint if one is given; `None` if it
-    /// names none.
+    /// The section in the form of the gateway, with another endpoint and another router if they are
+    /// given; `None` if it names neither.
     ///
     /// # Errors
     /// No listener could be served so.
-    pub fn settings(&self, other: Option<Endpoint>) -> Result<Option<Settings>, SettingsError> {
+    pub fn settings(
+        &self,
+        endpoint: Option<Endpoint>,
+        router: Option<Endpoint>,
+    ) -> Result<Option<Settings>, SettingsError> {
         let allowed = Allowed::new(&self.topics, &self.rates)?;
         let proof = self.proof()?;
-        let Some(endpoint) = other.or_else(|| self.endpoint.clone()) else {
+        let endpoint = endpoint.or_else(|| self.endpoint.clone());
+        let router = router.or_else(|| self.router.clone());
+        if endpoint.is_none() && router.is_none() {
             return Ok(None);
-        };
-        Settings::new(endpoint, allowed, proof).map(Some)
+        }
+        Settings::new(endpoint, router, allowed, proof).map(Some)
     }
 
     /// The files by which this end proves who it is, if they are named.

@@ -1,118 +1,111 @@
-//! Connects `lager top` to the bus: reads the topics that the model wants, and finds out who writes
-//! and reads each.
+//! Connects `lager top` to the bus, or to a gateway: reads the topics that the model wants, and finds
+//! out who writes and reads each.
 //!
 //! A row that is closed or filtered out has no subscription. Its writers and readers come from the
-//! bus's own lists. The head needs five states of the robot, and the stop word.
+//! bus's own lists. The head needs six states of the robot, and the stop word.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use lager_home::{BusWatch, Clock};
-use lager_ports::{
-    Bus, NodeInfo, NodeState, PortError, ReceiveError, Source, Subscriber, TopicInfo,
-};
-use lager_sample::Topic;
-use lager_stop::{StopPage, StopWord};
+use lager_ports::{NodeInfo, Place, ReceiveError, Source, TopicInfo, Watched, newest};
+use lager_sample::{Stamp, Topic};
 use lager_topics::{
     LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, SteeringState, TopicVisitor,
     visit,
 };
 use lager_wake::Watchdog;
 
-use super::head::{Failing, Load};
+use super::head::Load;
 use super::model::Model;
-use super::row::Life;
 use crate::ToolError;
+use crate::life::Life;
+use crate::origin::Origin;
 use crate::source::Stamped;
 
 /// How many samples of one topic are taken in one look.
 const TURN: u64 = 1_024;
 
-/// The services that write a sign of life, because nothing on the bus shows that they live.
-const SIGNING: [&str; 3] = ["comm", "station", "gateway"];
-
-/// Reads a robot's bus.
-pub(crate) struct Feed<'a> {
-    bus: &'a Bus,
+/// Reads a robot's topics.
+pub(crate) struct Feed<'a, P: Origin> {
+    place: &'a P,
     watchdog: &'a Watchdog,
     load: fn() -> Load,
     open: BTreeMap<String, Box<dyn Pull>>,
     /// Topics that could not be read at the last look, such as one with no place left.
     refused: BTreeSet<String>,
-    services: BusWatch,
-    ports: BusWatch,
+    watch: P::Watch,
     ends: Option<Ends>,
-    health: Subscriber<LinkHealth>,
-    status: Subscriber<NavStatus>,
-    queue: Subscriber<MissionQueue>,
-    report: Subscriber<SteeringState>,
-    path: Subscriber<LatencyPath>,
-    command: Subscriber<LatencyCommand>,
-    /// Real and robot time at the last look at the clock.
-    clock: Clock,
-    clocked: (Instant, Duration),
+    health: Option<P::Typed<LinkHealth>>,
+    status: Option<P::Typed<NavStatus>>,
+    queue: Option<P::Typed<MissionQueue>>,
+    report: Option<P::Typed<SteeringState>>,
+    path: Option<P::Typed<LatencyPath>>,
+    command: Option<P::Typed<LatencyCommand>>,
+    /// The stamps' and the robot's time at the last look at them.
+    clocked: Option<(u64, Duration)>,
 }
 
-impl<'a> Feed<'a> {
-    /// Opens the five states of the head.
+impl<'a, P: Origin> Feed<'a, P> {
+    /// Opens the states of the head.
     ///
     /// # Errors
     /// There are too many observers, or a process of another build.
     pub(crate) fn new(
-        bus: &'a Bus,
+        place: &'a P,
         watchdog: &'a Watchdog,
         load: fn() -> Load,
     ) -> Result<Self, ToolError> {
-        let open = || -> Result<Self, PortError> {
-            let clock = bus.clock();
+        let open = || -> Result<Self, P::OpenError> {
             Ok(Self {
-                bus,
+                place,
                 watchdog,
                 load,
                 open: BTreeMap::new(),
                 refused: BTreeSet::new(),
-                services: BusWatch::of_services(),
-                ports: BusWatch::of_ports(),
+                watch: place.watch(Watched::Ends),
                 ends: None,
-                health: bus.subscriber()?,
-                status: bus.subscriber()?,
-                queue: bus.subscriber()?,
-                report: bus.subscriber()?,
-                path: bus.subscriber()?,
-                command: bus.subscriber()?,
-                clocked: (Instant::now(), clock.now()),
-                clock,
+                health: place.typed()?,
+                status: place.typed()?,
+                queue: place.typed()?,
+                report: place.typed()?,
+                path: place.typed()?,
+                command: place.typed()?,
+                clocked: place.unit_time(),
             })
         };
-        Ok(watchdog.over("opening the topics", open)?)
+        watchdog
+            .over("opening the topics", open)
+            .map_err(Into::into)
     }
 
     /// Finds out who writes and reads the topics, and reads those that the model wants.
     pub(crate) fn look(&mut self, model: &mut Model) -> Result<(), ToolError> {
-        let bus = self.bus;
-        // Update both, so that each is of this moment.
-        let is_other = self.services.has_changed(bus.home()) | self.ports.has_changed(bus.home());
-        let ends = match self.ends.take().filter(Ends::writers_are_there) {
-            Some(ends) if !is_other => ends,
-            // This keeps a core busy for tens of milliseconds, which the robot's path would feel.
-            _ => Ends::look(bus, self.watchdog)?,
+        let place = self.place;
+        let is_other = place.has_changed(&mut self.watch);
+        let ends = self
+            .ends
+            .take()
+            .filter(|ends| !is_other && ends.are_there(place));
+        let ends = match ends {
+            Some(ends) => ends,
+            // On the bus this keeps a core busy for tens of milliseconds, which the robot's path
+            // would feel.
+            None => Ends::look(place, self.watchdog)?,
         };
-        model.take_ends(&ends.topics, |pid| ends.life(pid));
-        model.head.failing = failing(bus, &ends.nodes);
+        model.take_ends(&ends.topics, |pid| place.life(&ends.nodes, pid));
+        model.head.failing = place.failing(&ends.nodes);
         self.ends = Some(ends);
         self.refused.clear();
-        let word = bus.home().unit(bus.unit()).join(StopPage::FILE);
-        let told = StopWord::read(&word).ok().flatten();
-        model.head.stop = told.and_then(|told| told.stop());
+        model.head.stop = place.stop();
         model.head.load = (self.load)();
-        let (then, robot_then) = self.clocked;
-        self.clocked = (Instant::now(), self.clock.now());
-        let real = (self.clocked.0 - then).as_secs_f64();
-        if real > 0.1 {
-            let robot = self.clocked.1.saturating_sub(robot_then);
-            model.head.pace = Some(robot.as_secs_f64() / real);
+        let now = place.unit_time();
+        if let (Some((then_ns, then)), Some((now_ns, now))) = (self.clocked, now) {
+            let real = now_ns.saturating_sub(then_ns) as f64 / 1e9;
+            if real > 0.1 {
+                model.head.pace = Some(now.saturating_sub(then).as_secs_f64() / real);
+            }
         }
+        self.clocked = now.or(self.clocked);
         self.follow(model)
     }
 
@@ -130,10 +123,12 @@ impl<'a> Feed<'a> {
             if self.open.contains_key(&name) || self.refused.contains(&name) {
                 continue;
             }
-            let open = || match visit(&name, Open { bus: self.bus }) {
-                Ok(opened) => opened.map(Some),
-                Err(_) => {
-                    let found = self.bus.found(&name)?;
+            let place = self.place;
+            let open = || match visit(&name, Open { place }) {
+                Ok(Ok(Some(opened))) => Ok(Some(opened)),
+                Ok(Err(error)) => Err(error),
+                Ok(Ok(None)) | Err(_) => {
+                    let found = place.described(&name)?;
                     Ok(found.map(|found| Box::new(Pulled::new(found)) as Box<dyn Pull>))
                 }
             };
@@ -158,38 +153,51 @@ impl<'a> Feed<'a> {
     }
 
     fn drain_all(&mut self, model: &mut Model) -> Result<(), ReceiveError> {
+        let now_ns = self.place.time().now_ns;
         for (name, pull) in &mut self.open {
-            pull.pull(name, model)?;
+            pull.pull(name, model, now_ns)?;
         }
-        if let Some(health) = self.health.latest()? {
-            let at_ns = health.stamp().publish_time_ns;
-            model.head.take_health(*health, at_ns);
+        let head = &mut model.head;
+        if let Some((stamp, health)) = last::<LinkHealth>(&mut self.health)? {
+            head.take_health(health, stamp.publish_time_ns);
         }
-        if let Some(status) = self.status.latest()? {
-            model.head.status = Some(*status);
+        if let Some((_, status)) = last::<NavStatus>(&mut self.status)? {
+            head.status = Some(status);
         }
-        if let Some(queue) = self.queue.latest()? {
-            model.head.queue = Some(*queue);
+        if let Some((_, queue)) = last::<MissionQueue>(&mut self.queue)? {
+            head.queue = Some(queue);
         }
-        if let Some(report) = self.report.latest()? {
-            let head = &mut model.head;
-            head.battery
-                .read(self.clock.now(), report.battery_decivolts);
+        if let Some((_, report)) = last::<SteeringState>(&mut self.report)? {
+            let robot = self
+                .place
+                .unit_time()
+                .map_or(Duration::ZERO, |(_, now)| now);
+            head.battery.read(robot, report.battery_decivolts);
             head.battery_decivolts = report.battery_decivolts;
         }
-        if let Some(path) = self.path.latest()? {
-            model.head.path.take(*path);
+        if let Some((_, path)) = last::<LatencyPath>(&mut self.path)? {
+            head.path.take(path);
         }
-        if let Some(command) = self.command.latest()? {
-            model.head.command.take(*command);
+        if let Some((_, command)) = last::<LatencyCommand>(&mut self.command)? {
+            head.command.take(command);
         }
         Ok(())
     }
 }
 
+/// The newest sample of a state that can be read, with its stamp.
+fn last<T: Topic>(
+    from: &mut Option<impl Source>,
+) -> Result<Option<(Stamp, T::Payload)>, ReceiveError> {
+    match from {
+        Some(from) => newest::<T>(from),
+        None => Ok(None),
+    }
+}
+
 /// A topic that is read.
 trait Pull {
-    fn pull(&mut self, name: &str, model: &mut Model) -> Result<(), ReceiveError>;
+    fn pull(&mut self, name: &str, model: &mut Model, now_ns: u64) -> Result<(), ReceiveError>;
 }
 
 struct Pulled<S> {
@@ -204,7 +212,7 @@ impl<S> Pulled<S> {
 }
 
 impl<S: Source> Pull for Pulled<S> {
-    fn pull(&mut self, name: &str, model: &mut Model) -> Result<(), ReceiveError> {
+    fn pull(&mut self, name: &str, model: &mut Model, now_ns: u64) -> Result<(), ReceiveError> {
         let mut found = 0;
         while found < TURN
             && let Some(stamp) = self.from.next(Stamped)?
@@ -212,25 +220,27 @@ impl<S: Source> Pull for Pulled<S> {
             model.hear(name, &stamp);
             found += 1;
         }
-        let lost = self.from.lost() - self.lost;
+        // A loss over a link is taken back if the sample comes late.
+        let lost = self.from.lost().saturating_sub(self.lost);
         self.lost = self.from.lost();
         if found > 0 || lost > 0 {
             let seen = (found, self.from.queue());
-            model.row(name).look(seen, lost, Clock::monotonic_ns());
+            model.row(name).look(seen, lost, now_ns);
         }
         Ok(())
     }
 }
 
-struct Open<'a> {
-    bus: &'a Bus,
+struct Open<'a, P> {
+    place: &'a P,
 }
 
-impl TopicVisitor for Open<'_> {
-    type Output = Result<Box<dyn Pull>, PortError>;
+impl<P: Place> TopicVisitor for Open<'_, P> {
+    type Output = Result<Option<Box<dyn Pull>>, P::OpenError>;
 
     fn visit<T: Topic>(self) -> Self::Output {
-        Ok(Box::new(Pulled::new(self.bus.subscriber::<T>()?)))
+        let opened = self.place.typed::<T>()?;
+        Ok(opened.map(|from| Box::new(Pulled::new(from)) as Box<dyn Pull>))
     }
 }
 
@@ -241,82 +251,18 @@ struct Ends {
 }
 
 impl Ends {
-    fn look(bus: &Bus, watchdog: &Watchdog) -> Result<Self, ToolError> {
-        let mut topics = watchdog.over("looking at the topics", || bus.topics())?;
-        topics.retain(|topic| topic.unit == *bus.unit());
+    fn look<P: Origin>(place: &P, watchdog: &Watchdog) -> Result<Self, ToolError> {
+        let topics = watchdog.over("looking at the topics", || place.every_topic());
         Ok(Self {
-            topics,
-            nodes: watchdog.over("looking at the processes", || bus.nodes())?,
+            topics: topics.map_err(Into::into)?,
+            nodes: watchdog.over("looking at the processes", || place.processes())?,
         })
     }
 
     /// Whether all writers of that moment still live. A killed one keeps its ports until somebody
     /// sweeps the bus.
-    fn writers_are_there(&self) -> bool {
+    fn are_there(&self, place: &impl Origin) -> bool {
         let mut writers = self.topics.iter().flat_map(|topic| &topic.writers);
-        let is_there = |pid: u32| pid == 0 || Path::new("/proc").join(pid.to_string()).exists();
-        writers.all(|writer| is_there(writer.pid))
-    }
-
-    fn life(&self, pid: u32) -> Life {
-        let node = self.nodes.iter().find(|node| node.pid == pid);
-        match node.map(|node| node.state) {
-            Some(NodeState::Stale) => Life::Dead,
-            _ => life(pid),
-        }
-    }
-}
-
-/// The processes of the robot and of its tools that stand still.
-fn failing(bus: &Bus, nodes: &[NodeInfo]) -> Vec<Failing> {
-    let (place, robot) = (bus.home(), bus.unit());
-    let mut found: Vec<Failing> = Vec::new();
-    let mut add = |who: &str, pid: u32, silent: Option<Duration>| {
-        if found.iter().all(|failing| failing.pid != pid) {
-            let who = who.to_owned();
-            found.push(Failing { who, pid, silent });
-        }
-    };
-    let holders = place.up().remove(robot).unwrap_or_default();
-    for holder in holders.iter().filter(|holder| holder.frozen) {
-        add(&holder.what, holder.pid, None);
-    }
-    let now_ns = Clock::monotonic_ns();
-    for who in SIGNING {
-        let Some(sign) = place.sign_of(robot, who) else {
-            continue;
-        };
-        match life(sign.pid) {
-            Life::Frozen => add(who, sign.pid, None),
-            Life::Alive if sign.is_old(now_ns) => {
-                let silent = Duration::from_nanos(now_ns.saturating_sub(sign.at_ns));
-                add(who, sign.pid, Some(silent));
-            }
-            _ => {}
-        }
-    }
-    for node in nodes {
-        if node.unit.as_ref() == Some(robot)
-            && let Some(part) = &node.part
-            && life(node.pid) == Life::Frozen
-        {
-            add(part, node.pid, None);
-        }
-    }
-    found
-}
-
-/// Whether a process runs, as the kernel says.
-fn life(pid: u32) -> Life {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    // The state follows the name, which is in parentheses and may contain anything.
-    let state = stat
-        .rsplit(") ")
-        .next()
-        .and_then(|rest| rest.chars().next());
-    match state {
-        Some('T' | 't') => Life::Frozen,
-        Some('Z' | 'X') | None => Life::Dead,
-        _ => Life::Alive,
+        writers.all(|writer| writer.pid == 0 || place.life(&[], writer.pid) != Life::Dead)
     }
 }

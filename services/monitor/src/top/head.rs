@@ -8,9 +8,10 @@ use lager_sample::Stamp;
 use lager_stop::Stop;
 use lager_topics::{
     BoardHealth, CommandLatency, Durations, Health, Hold, NavigatorStatus, OrderQueue, PathLatency,
-    called,
 };
 use serde_json::{Value, json};
+
+use crate::life::{Failing, span};
 
 /// The load of the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,32 +20,6 @@ pub struct Load {
     pub minute: f64,
     /// Cores.
     pub cores: usize,
-}
-
-/// A process of the robot that stands still.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Failing {
-    /// Its role, or its name on the command line.
-    pub(crate) who: String,
-    pub(crate) pid: u32,
-    /// How long it has given no sign of life; `None` if it is frozen.
-    pub(crate) silent: Option<Duration>,
-}
-
-impl Failing {
-    /// What is wrong, and what helps.
-    pub(crate) fn said(&self) -> String {
-        let (who, pid) = (called(&self.who), self.pid);
-        match self.silent {
-            None => {
-                format!("the {who}, process {pid}, is frozen; `kill -CONT {pid}` lets it go on")
-            }
-            Some(long) => format!(
-                "the {who}, process {pid}, has not gone on for {}",
-                span(long)
-            ),
-        }
-    }
 }
 
 /// The content of the head.
@@ -349,17 +324,6 @@ pub(crate) fn shares<const N: usize>(stage: &Durations, from_ns: f64, to_ns: f64
         }
     }
     shares
-}
-
-/// A span in a few letters.
-pub(crate) fn span(span: Duration) -> String {
-    let seconds = span.as_secs_f64();
-    match seconds {
-        s if s < 1.0 => format!("{:.0} ms", s * 1e3),
-        s if s < 60.0 => format!("{s:.1} s"),
-        s if s < 3_600.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.0} h", s / 3_600.0),
-    }
 }
 
 #[cfg(test)]

@@ -1,15 +1,14 @@
 //! `lager top`: the robot and all of its topics on one screen, live or over a recording.
 //!
 //! ```text
-//!   bus ──feed──> model ──render──> terminal, text or JSON
-//!   file ───────>   ^
-//!   keys ───────────┘
+//!   bus, gateway ──feed──> model ──render──> terminal, text or JSON
+//!   file ────────────────>   ^
+//!   keys ────────────────────┘
 //! ```
 //!
 //! [`model`] and [`render`] are pure. `feed` reads the bus, and this file reads the terminal.
 //! `lager top` is an observer like the other tools, and looks at the queues every 5 ms. It does not
 //! read topics whose rows are not shown. Its figures come from stamps; it reads only the payloads
-//! that the head needs.
 //! that the head needs.
 
 mod feed;
@@ -23,7 +22,6 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use lager_battery::{Battery, Pack};
-use lager_home::Clock;
 use lager_sample::{Description, Stamp, Topic};
 use lager_topics::{LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus};
 use lager_wake::{Shutdown, urgency};
@@ -38,6 +36,7 @@ use serde_json::{Value, json};
 use self::feed::Feed;
 pub use self::head::Load;
 use self::model::{Key, Model, Pressed};
+use crate::origin::Origin;
 use crate::{POLL, ToolError, Tools};
 
 /// The length of a window of figures, and how often it asks for writers and readers, and draws.
@@ -58,8 +57,8 @@ pub struct TopConfig {
     pub load: fn() -> Load,
 }
 
-impl<W: Write> Tools<'_, W> {
-    /// `lager top` on the bus. A key, the shutdown, or its one picture ends it.
+impl<W: Write, P: Origin> Tools<'_, W, P> {
+    /// `lager top` on the bus, or over a robot's gateway. A key, the shutdown, or its one picture ends it.
     ///
     /// # Errors
     /// The bus cannot be read, or the terminal cannot be used.
@@ -70,7 +69,7 @@ impl<W: Write> Tools<'_, W> {
         urgency::wake_with_others(POLL);
         let mut feed = Feed::new(self.place, self.watchdog, config.load)?;
         feed.look(&mut model)?;
-        model.end_window(Clock::monotonic_ns());
+        model.end_window(self.place.time().now_ns);
         let Some(long) = config.once else {
             let mut screen = Screen::enter()?;
             return self.watch(&mut model, &mut feed, &mut screen);
@@ -81,14 +80,14 @@ impl<W: Write> Tools<'_, W> {
             std::thread::sleep(POLL);
         }
         feed.look(&mut model)?;
-        model.end_window(Clock::monotonic_ns());
+        model.end_window(self.place.time().now_ns);
         Ok(print(&model, self.as_json, self.out)?)
     }
 
     fn watch(
         &mut self,
         model: &mut Model,
-        feed: &mut Feed<'_>,
+        feed: &mut Feed<'_, P>,
         screen: &mut Screen,
     ) -> Result<(), ToolError> {
         let mut looked = Instant::now();
@@ -97,11 +96,9 @@ impl<W: Write> Tools<'_, W> {
             feed.drain(model)?;
             if looked.elapsed() >= WINDOW {
                 looked = Instant::now();
-                if !self.place.is_listed() {
-                    return Err(ToolError::Cleared);
-                }
+                self.must_still_tell()?;
                 feed.look(model)?;
-                model.end_window(Clock::monotonic_ns());
+                model.end_window(self.place.time().now_ns);
                 is_changed |= !model.view.is_paused;
             }
             match screen.key(POLL)? {

@@ -9,7 +9,8 @@ use lager_topics::TOPICS;
 use serde_json::{Value, json};
 
 use super::head::Head;
-use super::row::{Life, Row, Trouble};
+use super::row::{Row, Trouble};
+use crate::life::Life;
 
 /// A little less than the first window of figures, in ns.
 const WINDOW_NS: u64 = 900_000_000;

@@ -12,9 +12,10 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 
-use super::head::{shares, span};
+use super::head::shares;
 use super::model::{Model, Sort};
-use super::row::{Life, Row, Trouble};
+use super::row::{Row, Trouble};
+use crate::life::{Life, span};
 
 /// From this height on, each stage of the path has a line.
 const ROOMY: u16 = 40;
@@ -120,6 +121,7 @@ fn head(model: &Model, page: &mut Page<'_>) {
     let now = model.now_ns;
     let of = match &model.file {
         Some(file) => format!("of {file}"),
+        None if head.load.cores == 0 => "from afar".to_owned(),
         None => format!(
             "load {:.2} on {}",
             head.load.minute,

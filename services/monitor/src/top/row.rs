@@ -8,6 +8,7 @@ use lager_sample::{Description, Stamp, TopicEntry};
 use serde_json::{Value, json};
 
 use crate::delay::Stage;
+use crate::life::Life;
 
 /// How long a loss stays visible.
 const REMEMBERED: Duration = Duration::from_secs(30);
@@ -17,32 +18,6 @@ const SLOW: f64 = 0.5;
 const FIRST_NS: u64 = 1_500_000_000;
 /// After this time without a sample there is no rate any more, in ns.
 const SILENT_NS: u64 = 10_000_000_000;
-
-/// Whether a process that writes a topic runs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Life {
-    /// It wrote a recording; nobody checks it any more.
-    Recorded,
-    /// It runs.
-    #[default]
-    Alive,
-    /// A signal has frozen it.
-    Frozen,
-    /// Somebody killed it, and its ports are still on the bus.
-    Dead,
-}
-
-impl Life {
-    /// In a word.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Recorded => "-",
-            Self::Alive => "alive",
-            Self::Frozen => "frozen",
-            Self::Dead => "dead",
-        }
-    }
-}
 
 /// A process that writes the topic.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -17,11 +17,11 @@ use lager_topics::{
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
-use super::head::{Failing, Load};
+use super::head::Load;
 use super::model::{Key, Model, Pressed};
 use super::render;
-use super::row::Life;
 use super::{Lacking, Recorded};
+use crate::life::Failing;
 
 const MS: u64 = 1_000_000;
 const S: u64 = 1_000 * MS;
