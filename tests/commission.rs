@@ -8,10 +8,11 @@ use std::fs;
 use std::process::{ChildStdin, Stdio};
 
 use lager_commission::Question;
-use lager_plant::{Build, Ranger};
-use lager_ports::Bus;
-use lager_tests::{Domain, Running, wait_for};
-use lager_topics::Role;
+use lager_orders::{Level, Mode, SwitchKind};
+use lager_plant::{Build, ButtonsBuild, ContactBuild, Ranger};
+use lager_ports::{Bus, Client};
+use lager_tests::{Domain, Running, WATCHDOG, wait_for};
+use lager_topics::{LinkHealth, Role, WorldAsk, WorldAskKind, WorldRequest};
 use person::Person;
 use rustix::process::Signal;
 
@@ -30,9 +31,18 @@ fn other() -> (u64, Build) {
             && build.reversed == [true, false]
             && build.ranger == Ranger::Gp2y0a02
             && joints == [true; 3]
+            && build.buttons.reset.is_some()
+            && is_high_button(&build.buttons)
             && arm.reversed[0] != arm.reversed[5]
     });
-    other.next().expect("one in some thousands")
+    other.next().expect("one in many thousands")
+}
+
+/// Whether the mode is a button that pulls its line high.
+fn is_high_button(buttons: &ButtonsBuild) -> bool {
+    buttons
+        .mode
+        .is_some_and(|(mode, kind)| kind == SwitchKind::Press && mode.contact.closed == Level::High)
 }
 
 /// A domain with a robot that is built otherwise, and its configuration.
@@ -83,6 +93,14 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
         &format!("\nwrist = {}\n", build.arm.ids[5].expect("a wrist")),
         &format!("\nshoulder = {}\n", build.arm.ids[1].expect("a shoulder")),
         &format!("\nbase = {}\n", build.arm.reversed[0]),
+        "chip = \"/dev/gpiochip0\"",
+        &format!("\nreset = {}\n", line(build.buttons.reset)),
+        &format!(
+            "\nswitch = {}\n",
+            line(build.buttons.mode.map(|(mode, _)| mode))
+        ),
+        "switch_kind = \"press\"",
+        "switch_closed = \"high\"",
     ] {
         assert!(text.contains(line), "{line}: {build:?}\n{text}");
     }
@@ -98,13 +116,45 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
     ]);
     assert_eq!(robot.wait(), Some(0), "{}\n{text}", robot.log());
     assert_eq!(robot.json()["delivered"], serde_json::json!([1]));
+    its_mode_button_toggles_the_mode(&domain, &config);
     domain.assert_clean();
+}
+
+fn line(contact: Option<ContactBuild>) -> u8 {
+    contact.expect("it has one").contact.line
+}
+
+/// The button of the simulated world goes the same way as one at a real line.
+fn its_mode_button_toggles_the_mode(domain: &Domain, config: &str) {
+    let mut robot = up(domain, config);
+    let bus = Bus::open(&domain.bus("r1", 1.0), Role::Operator).expect("the bus opens");
+    let world: Client<WorldRequest> = bus.client().expect("a request");
+    let mut health = bus.subscriber::<LinkHealth>().expect("a topic");
+    for mode in [Mode::Autonomous, Mode::Manual] {
+        for is_closed in [1, 0] {
+            let press = WorldAsk {
+                kind: WorldAskKind::Press.into(),
+                x: 1,
+                y: is_closed,
+                ..WorldAsk::default()
+            };
+            wait_for("the world", || world.call(press, WATCHDOG / 100).ok());
+            // As long as a finger takes; two presses are not one that bounces.
+            std::thread::sleep(std::time::Duration::from_millis(300));
+        }
+        wait_for("the other mode", || {
+            let health = health.latest().expect("readable")?;
+            (health.mode == mode).then_some(())
+        });
+    }
+    drop((world, health, bus));
+    robot.signal(Signal::INT);
+    // Whether it had a mission that failed is of no interest.
+    robot.wait().expect("it ends");
 }
 
 #[test]
 fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
-    use lager_topics::LinkHealth;
-
     let (built, build) = other();
     let (domain, config) = unknown(built);
     let mut robot = up(&domain, &config);

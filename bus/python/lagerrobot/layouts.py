@@ -360,6 +360,8 @@ class ThoughtKind(enum.IntEnum):
     ResetUnheard = 65
     ResetWithoutMap = 66
     ResetElsewhere = 67
+    SetUpInTerminal = 68
+    SetUpAtPage = 69
 
 
 class Joint(enum.IntEnum):
@@ -960,7 +962,7 @@ class Event(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0x8A944A60FBB551E8
+    _hash_ = 0x159AF761563BF94B
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),
@@ -1077,7 +1079,7 @@ class TruthObstacle(Layout):
 
 class Truth(Layout):
     _type_name_ = "lager::Truth"
-    _hash_ = 0xE7C32AED32255959
+    _hash_ = 0x244F364053E556BA
     _fields_ = [
         ("time_ns", ctypes.c_uint64),
         ("x_mm", ctypes.c_double),
@@ -1095,14 +1097,18 @@ class Truth(Layout):
         ("goods", TruthGood * 256),
         ("obstacles", TruthObstacle * 64),
         ("obstacle_count", ctypes.c_uint16),
-        ("reserved", ctypes.c_uint8 * 6),
+        ("reset_closed", ctypes.c_uint8),
+        ("mode_closed", ctypes.c_uint8),
+        ("lines_low", ctypes.c_uint32),
+        ("lines_high", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint8 * 4),
     ]
     _enums_ = {}
     _dtype_ = {
-        "names": ["time_ns", "x_mm", "y_mm", "heading_rad", "left_mm_per_s", "right_mm_per_s", "carrying", "good_count", "left_duty", "right_duty", "servo_position", "battery_charge", "collisions", "goods", "obstacles", "obstacle_count", "reserved"],
-        "formats": ["<u8", "<f8", "<f8", "<f8", "<f4", "<f4", "<i4", "<u2", "<u1", "<u1", ("<u2", (8,)), "<f4", "<u4", (TruthGood._dtype_, (256,)), (TruthObstacle._dtype_, (64,)), "<u2", ("<u1", (6,))],
-        "offsets": [0, 8, 16, 24, 32, 36, 40, 44, 46, 47, 48, 64, 68, 72, 5192, 5448, 5450],
-        "itemsize": 5456,
+        "names": ["time_ns", "x_mm", "y_mm", "heading_rad", "left_mm_per_s", "right_mm_per_s", "carrying", "good_count", "left_duty", "right_duty", "servo_position", "battery_charge", "collisions", "goods", "obstacles", "obstacle_count", "reset_closed", "mode_closed", "lines_low", "lines_high", "reserved"],
+        "formats": ["<u8", "<f8", "<f8", "<f8", "<f4", "<f4", "<i4", "<u2", "<u1", "<u1", ("<u2", (8,)), "<f4", "<u4", (TruthGood._dtype_, (256,)), (TruthObstacle._dtype_, (64,)), "<u2", "<u1", "<u1", "<u4", "<u4", ("<u1", (4,))],
+        "offsets": [0, 8, 16, 24, 32, 36, 40, 44, 46, 47, 48, 64, 68, 72, 5192, 5448, 5450, 5451, 5452, 5456, 5460],
+        "itemsize": 5464,
     }
 
 

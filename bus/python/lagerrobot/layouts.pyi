@@ -336,6 +336,8 @@ class ThoughtKind(enum.IntEnum):
     ResetUnheard = 65
     ResetWithoutMap = 66
     ResetElsewhere = 67
+    SetUpInTerminal = 68
+    SetUpAtPage = 69
 
 class Joint(enum.IntEnum):
     Base = 0
@@ -693,6 +695,10 @@ class Truth(Layout):
     goods: Sequence[TruthGood]
     obstacles: Sequence[TruthObstacle]
     obstacle_count: int
+    reset_closed: int
+    mode_closed: int
+    lines_low: int
+    lines_high: int
     reserved: Sequence[int]
 
 TOPICS: dict[str, TopicEntry]

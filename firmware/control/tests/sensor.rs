@@ -443,6 +443,48 @@ fn a_calibration_outlives_the_power_and_an_empty_one_is_not_kept() {
 }
 
 #[test]
+fn a_calibration_is_taken_back_while_it_runs_and_after_it_has_ended_and_only_once() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    let calibrates = |bench: &mut SensorBench, seq, [floor, tape]: [u8; 2]| {
+        bench.set(SettingKey::Calibrate, seq, 1);
+        for reading in [floor, tape] {
+            bench.pins.line = [reading; 11];
+            bench.run_ms(2_600);
+        }
+        bench.run_ms(300);
+    };
+    let both = |bench: &SensorBench| [2, 34].map(|copy| bench.pins.eeprom[copy]);
+    calibrates(&mut bench, 1, [30, 110]);
+    calibrates(&mut bench, 2, [50, 150]);
+    assert_eq!(both(&bench), [70, 100]);
+    // One that runs ends, and what was in force stays.
+    bench.set(SettingKey::Calibrate, 3, 1);
+    bench.pins.line = [200; 11];
+    bench.run_ms(1_000);
+    for _ in 0..2 {
+        bench.set(SettingKey::Calibrate, 4, 2);
+        bench.run_ms(100);
+        let last = *replies(&bench).last().expect("an answer");
+        assert_eq!((last.value, last.status), (2, SettingStatus::Accepted));
+    }
+    bench.run_ms(5_000);
+    assert_eq!(both(&bench), [70, 100]);
+    // The last one that has ended is taken back, once and for good.
+    for seq in [5, 5, 6] {
+        bench.set(SettingKey::Calibrate, seq, 2);
+        bench.run_ms(500);
+        assert_eq!(both(&bench), [70, 70]);
+    }
+    bench.pins.line = [30, 30, 30, 30, 30, 71, 30, 30, 30, 30, 30];
+    bench.run_ms(50);
+    let lines = bench.pi.all(|payload| match payload {
+        Payload::Line(state) => Some(state),
+        _ => None,
+    });
+    assert_eq!(lines.last().expect("a line").1, LineState::OnLine);
+}
+
+#[test]
 fn the_watchdog_is_kicked_well_inside_its_time() {
     let mut bench = SensorBench::boot(0, SensorConfig::default());
     bench.pi.answers = false;

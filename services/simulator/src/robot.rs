@@ -203,6 +203,14 @@ impl Robot {
         }
     }
 
+    /// What a board keeps without power.
+    pub fn eeprom(&self, wire: Wire) -> &[u8] {
+        match wire {
+            Wire::Sensor => &self.sensor.chip.eeprom,
+            Wire::Steering => &self.steering.chip.eeprom,
+        }
+    }
+
     /// Resets a board now. The steering board's motors go off at once.
     pub fn reset_board(&mut self, wire: Wire, cause: ResetCause) {
         let now = self.now_ns;

@@ -155,6 +155,40 @@ fn whoever_quits_leaves_the_boards_with_what_they_were_told_before() {
     assert_eq!(person.kept, None);
 }
 
+/// The thresholds of the line sensors in both copies that their board keeps.
+fn thresholds(person: &Person) -> [Vec<u8>; 2] {
+    let eeprom = person.whole.robot.eeprom(Wire::Sensor);
+    [2, 34].map(|copy| eeprom[copy..copy + 11].to_vec())
+}
+
+#[test]
+fn whoever_quits_or_goes_back_has_the_former_thresholds_of_the_line_sensors_again() {
+    for goes_back in [false, true] {
+        let mut person = Person::new(&Config::default(), Build::default(), 1);
+        person.until(Question::RangeFar);
+        person.wait(Duration::from_secs(1));
+        assert!(person.machine().has_calibrated());
+        let [new, _] = thresholds(&person);
+        if goes_back {
+            person.say(Answer::Back);
+        } else {
+            let now = person.whole.moment();
+            person.machine().quit(now);
+        }
+        person.wait(Duration::from_secs(2));
+        assert!(!person.machine().has_calibrated());
+        let [one, other] = thresholds(&person);
+        assert!(one == other && one != new, "{one:?} {other:?} {new:?}");
+        if goes_back {
+            assert_eq!(person.machine().question(), Some(Question::LineSway));
+            // It can be done again.
+            person.asked = None;
+            person.until(Question::RangeFar);
+            assert!(person.machine().has_calibrated());
+        }
+    }
+}
+
 #[test]
 fn back_and_again_bring_back_what_held_before_and_skip_changes_nothing() {
     let build = Build {

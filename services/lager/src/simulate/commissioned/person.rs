@@ -5,17 +5,17 @@ use std::f64::consts::TAU;
 use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
+use lager_bridge::buttons::Told;
 use lager_commission::{Answer, Built, Commissioning, Effect, Joint, Question, Step, Takes, Way};
 use lager_orders::{Language, Mode, Moment, SwitchKind};
-use lager_plant::{Build, ButtonsBuild, Pose};
+use lager_plant::{Build, ButtonsBuild, Pose, World};
 use lager_stop::Stop;
 use lager_supervisor::mission::{Helper, Mission, Watch};
-use lager_topics::{Ask, AskKind, BridgeAnswer, Part, Role, StopCause};
+use lager_topics::{Ask, AskKind, BridgeAnswer, ButtonLines, Part, Role, StopCause};
 use lager_wire::{ArmPose, ArmProfile, SERVO_MAX};
 
 use super::super::Whole;
 use super::super::built::robot;
-use super::buttons;
 use crate::commission::uncalibrate;
 use crate::config::Config;
 
@@ -198,7 +198,7 @@ impl Person {
                 }
             };
             self.whole.wizard.as_mut().expect("one").asked = Some(asked);
-            let told = buttons::told(self.whole.robot.world());
+            let told = told(self.whole.robot.world());
             self.whole.bridge.hear_lines(told);
             self.whole.ask(&ask);
         }
@@ -441,5 +441,14 @@ impl Person {
 
     pub(super) fn duties(&self) -> [i16; 2] {
         self.whole.robot.world().duties()
+    }
+}
+
+/// What the bridge's thread tells of the lines.
+fn told(world: &World) -> Told {
+    Told {
+        state: ButtonLines::Read,
+        chip: 0,
+        levels: world.levels(),
     }
 }
