@@ -112,6 +112,7 @@ fn top_shows_the_robot_from_afar_and_says_what_is_old() {
     wait_for("the stop", || {
         stopped(&one_picture(&domain, &["--remote", &endpoint])).then_some(())
     });
+    domain.done(&["resume"]);
     drop((listens, up));
     domain.assert_clean();
 }
@@ -298,6 +299,7 @@ fn figures_and_views_of_a_robot_elsewhere_are_those_of_its_own_gateway() {
     until(&metrics, ORDERED, |latched| latched == 0.0);
     domain.done(&["stop"]);
     until(&metrics, ORDERED, |latched| latched == 1.0);
+    domain.done(&["resume"]);
     // A topic of a user's own, in both.
     let mut number = 0;
     let mut publish = || {

@@ -31,10 +31,15 @@ const FLUSH: Duration = Duration::from_millis(150);
 
 /// Runs the chosen tool.
 pub fn run(config: &Config, args: BagArgs, shutdown: &Shutdown) -> Result<ExitCode> {
-    let out = &mut BufWriter::new(std::io::stdout().lock());
-    let done = match args.command {
+    let command = match args.command {
         BagCommand::Record(record_args) => return record(config, record_args, args.json, shutdown),
         BagCommand::Play(play_args) => return play(config, play_args, args.json, shutdown),
+        command => command,
+    };
+    // Not before: recordings of several robots print from threads of their own.
+    let out = &mut BufWriter::new(std::io::stdout().lock());
+    let done = match command {
+        BagCommand::Record(_) | BagCommand::Play(_) => unreachable!("they print by themselves"),
         BagCommand::Info { file } => lager_recorder::info(&file, args.json, out).map(|()| true),
         BagCommand::Check { file } => file.iter().try_fold(true, |whole, file| {
             Ok(lager_recorder::check(file, args.json, out)? && whole)

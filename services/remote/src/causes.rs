@@ -35,7 +35,7 @@ pub(crate) fn told() -> Option<&'static str> {
 }
 
 fn in_words(warning: &str) -> Option<&'static str> {
-    const WORDS: [(&str, &str); 9] = [
+    const WORDS: [(&str, &str); 10] = [
         (
             "CertificateRequired",
             "the robot asks for a certificate, and this listener has shown none that counts",
@@ -65,6 +65,11 @@ fn in_words(warning: &str) -> Option<&'static str> {
             "the certificate of the robot is not of the authority that this listener trusts",
         ),
         ("Connection refused", "nothing listens there"),
+        (
+            "invalid dns name",
+            "over TLS Zenoh calls no IPv6 address in digits; write a name of it that `lager keys robot \
+             --address` has put into the certificate",
+        ),
     ];
     // What the other end says in its alert is about this end's certificate.
     if warning.contains("received fatal alert") {

@@ -34,6 +34,8 @@ mod certificates;
 #[cfg(feature = "zenoh")]
 mod error;
 #[cfg(feature = "zenoh")]
+mod heard;
+#[cfg(feature = "zenoh")]
 mod listener;
 #[cfg(feature = "zenoh")]
 mod place;
@@ -72,7 +74,7 @@ pub use router::Router;
 #[cfg(feature = "zenoh")]
 pub use session::ZenohError;
 pub use settings::{Proof, Settings, SettingsError};
-pub use told::{About, Beat, Ends, Kind, Time, Told};
+pub use told::{About, Beat, Ends, Kind, RobotTime, Time, Told};
 #[cfg(feature = "zenoh")]
 pub use typed::Typed;
 

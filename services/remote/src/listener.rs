@@ -22,6 +22,7 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
 use crate::error::{LARGEST, PATIENCE, RemoteError};
+use crate::heard::LastHeard;
 use crate::key::Keys;
 use crate::ledger::{Account, Heard, Ledger};
 use crate::note::{Note, layout_number};
@@ -94,6 +95,8 @@ pub struct Listening {
     heard: Option<Instant>,
     /// Whether the gateway's token is there; `None` before that is known.
     is_there: Option<bool>,
+    /// What the whole connection knows of it.
+    link: LastHeard,
     key: String,
     to: SyncSender<Message>,
     from: Receiver<Message>,
@@ -111,6 +114,7 @@ impl Listening {
         keys: &Keys,
         (topic, key): (&str, String),
         about: &About,
+        link: &LastHeard,
     ) -> Result<Self, RemoteError> {
         let description =
             Description::parse(&about.layout).map_err(|error| RemoteError::Layout {
@@ -133,6 +137,7 @@ impl Listening {
             unreadable: None,
             heard: None,
             is_there: None,
+            link: link.clone(),
             key,
             to,
             from,
@@ -177,7 +182,10 @@ impl Listening {
         loop {
             match self.from.try_recv().ok()? {
                 Message::Sample { payload, note } => match self.read(&payload, &note) {
-                    Ok((note, Heard::New)) => return Some((note, payload)),
+                    Ok((note, Heard::New)) => {
+                        self.link.now();
+                        return Some((note, payload));
+                    }
                     Ok((_, Heard::Repeated)) => {}
                     Err(why) => {
                         if self.unreadable.as_deref() != Some(&*why) {

@@ -31,11 +31,7 @@ impl Place for Remote {
     }
 
     fn typed<T: Topic>(&self) -> Result<Option<Typed<T>>, RemoteError> {
-        match self.listen(T::NAME) {
-            Ok(heard) => Ok(Typed::of(heard)),
-            Err(RemoteError::NotCarried { .. }) => Ok(None),
-            Err(error) => Err(error),
-        }
+        Ok(self.listen_to_known(T::NAME)?.and_then(Typed::of))
     }
 
     fn described(&self, name: &str) -> Result<Option<Listening>, RemoteError> {

@@ -26,6 +26,7 @@ use crate::causes;
 use crate::clocks::{Clocks, Offset};
 use crate::endpoint::Endpoint;
 use crate::error::{PATIENCE, RemoteError};
+use crate::heard::LastHeard;
 use crate::key::{EVERY_ALIVE, Keys, alive_of};
 use crate::listener::{Listening, bytes, telling};
 use crate::session::{self, ZenohError};
@@ -42,6 +43,8 @@ const SILENT: Duration = Duration::from_secs(3);
 const TRIPS: usize = 5;
 /// How long one round trip may take; a longer one would tell little.
 const TRIP: Duration = Duration::from_secs(1);
+/// The shortest span that tells the pace of the robot's time.
+const SPAN: Duration = Duration::from_millis(500);
 /// How many messages wait for the thread. Another beat comes soon.
 const QUEUE: usize = 16;
 
@@ -58,7 +61,10 @@ pub struct Remote {
 
 /// What is known of the gateway.
 #[derive(Debug, Default)]
-struct Known(Mutex<Now>);
+struct Known {
+    now: Mutex<Now>,
+    heard: LastHeard,
+}
 
 #[derive(Debug, Default)]
 struct Now {
@@ -71,19 +77,18 @@ struct Now {
     /// Whether the gateway's machine is this one, as it says.
     is_here: bool,
     unix_offset_ns: i64,
-    /// The robot's own time at a moment of the stamps' clock, as the last beat told it.
+    /// The robot's own time at a moment of the stamps' clock, as the gateway told it last.
     robot_time: Option<(u64, Duration)>,
-    /// Seconds of robot time in a second, if the last two beats tell it.
+    /// Seconds of robot time in a second, if it was told twice.
     pace: Option<f64>,
-    /// When something was last heard.
-    heard: Option<Instant>,
-    is_lost: bool,
+    /// Since when it has not been heard any more.
+    lost: Option<Instant>,
     is_quiet: bool,
 }
 
 impl Known {
     fn now(&self) -> MutexGuard<'_, Now> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.now.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -102,8 +107,11 @@ impl Now {
     fn take_robot_time(&mut self, at_ns: u64, robot: Duration) {
         if let Some((then_ns, then)) = self.robot_time {
             let real = Duration::from_nanos(at_ns.saturating_sub(then_ns)).as_secs_f64();
+            if real < SPAN.as_secs_f64() {
+                return;
+            }
             let pace = robot.saturating_sub(then).as_secs_f64() / real;
-            // Neither of a new gateway nor of a clock that stands still.
+            // None of a clock that stands still.
             self.pace = Some(pace)
                 .filter(|pace| pace.is_finite() && *pace > 0.0)
                 .or(self.pace);
@@ -212,15 +220,30 @@ impl Remote {
     /// # Errors
     /// The gateway does not carry it, or its layout cannot be read.
     pub fn listen(&self, topic: &str) -> Result<Listening, RemoteError> {
-        let mut topics = self.known_topics()?;
-        let (Some(about), Some(key)) = (topics.remove(topic), self.keys.topic(topic)) else {
-            return Err(RemoteError::NotCarried {
-                topic: topic.to_owned(),
-                robot: self.robot.clone(),
-                carried: topics.into_keys().collect(),
-            });
+        match self.listen_to_known(topic)? {
+            Some(heard) => Ok(heard),
+            None => {
+                // It may have come this moment.
+                let topics = self.topics()?;
+                self.known.now().topics.clone_from(&topics);
+                let heard = self.listen_to_known(topic)?;
+                heard.ok_or_else(|| RemoteError::NotCarried {
+                    topic: topic.to_owned(),
+                    robot: self.robot.clone(),
+                    carried: topics.into_keys().collect(),
+                })
+            }
+        }
+    }
+
+    /// Listens to a topic of which the gateway has told already; `None` if it has not.
+    pub(crate) fn listen_to_known(&self, topic: &str) -> Result<Option<Listening>, RemoteError> {
+        let about = self.known_topics()?.remove(topic);
+        let (Some(about), Some(key)) = (about, self.keys.topic(topic)) else {
+            return Ok(None);
         };
-        Listening::open(&self.session, &self.keys, (topic, key), &about)
+        let heard = &self.known.heard;
+        Listening::open(&self.session, &self.keys, (topic, key), &about, heard).map(Some)
     }
 
     /// How often its topics, writers or readers have changed so far.
@@ -230,9 +253,8 @@ impl Remote {
 
     /// How long nothing has come from the gateway, if that is longer than it should be.
     pub fn silence(&self) -> Option<Duration> {
-        let now = self.known.now();
-        let silent = now.heard.map_or(Duration::ZERO, |heard| heard.elapsed());
-        (now.is_lost || silent >= SILENT).then_some(silent)
+        let silent = self.known.heard.silence().unwrap_or_default();
+        (self.known.now().lost.is_some() || silent >= SILENT).then_some(silent)
     }
 
     /// From now on whoever asks [`Remote::silence`] tells a person of it, and this does not.
@@ -296,9 +318,11 @@ impl Asker {
                 Ok(Told::There) => {}
                 Ok(Told::Gone) => self.lose(),
                 Err(RecvTimeoutError::Timeout) => {
-                    let heard = self.known.now().heard;
-                    if heard.is_some_and(|heard| heard.elapsed() >= SILENT) {
-                        self.lose();
+                    let silent = self.known.heard.silence();
+                    match silent.is_some_and(|silent| silent >= SILENT) {
+                        true => self.lose(),
+                        // On a full link samples come, and no beat.
+                        false => self.find_again(silent),
                     }
                 }
                 Err(RecvTimeoutError::Disconnected) => return,
@@ -312,19 +336,9 @@ impl Asker {
             return;
         };
         let version = Some((beat.run, beat.about));
-        let is_new = {
-            let mut now = self.known.now();
-            let silent = now.heard.replace(Instant::now());
-            now.take_robot_time(beat.now_ns, Duration::from_nanos(beat.robot_ns));
-            if std::mem::take(&mut now.is_lost) && !now.is_quiet {
-                let silent = silent.map_or(0.0, |heard| heard.elapsed().as_secs_f64());
-                tracing::warn!(
-                    "the gateway of `{}` is heard again, after {silent:.1} s",
-                    self.robot
-                );
-            }
-            now.version != version
-        };
+        self.known.heard.now();
+        self.find_again(self.known.heard.silence());
+        let is_new = self.known.now().version != version;
         if is_new
             && let Ok(topics) = self.topics()
             && !topics.is_empty()
@@ -336,10 +350,33 @@ impl Asker {
         self.make_a_trip();
     }
 
+    /// Says once that the gateway is heard again, if that was after it was lost.
+    fn find_again(&self, silent: Option<Duration>) {
+        let mut now = self.known.now();
+        let Some(lost) = now.lost.map(|lost| lost.elapsed()) else {
+            return;
+        };
+        if silent.is_none_or(|silent| silent >= lost) {
+            return;
+        }
+        now.lost = None;
+        if !now.is_quiet {
+            let lost = lost.as_secs_f64();
+            tracing::warn!(
+                "the gateway of `{}` is heard again, after {lost:.1} s",
+                self.robot
+            );
+        }
+    }
+
     /// Says once that the gateway is not heard any more.
     fn lose(&self) {
         let mut now = self.known.now();
-        if !std::mem::replace(&mut now.is_lost, true) && !now.is_quiet {
+        if now.lost.is_some() {
+            return;
+        }
+        now.lost = Some(Instant::now());
+        if !now.is_quiet {
             tracing::warn!(
                 "the gateway of `{}` is not heard any more; this goes on when it is back",
                 self.robot
@@ -389,6 +426,7 @@ impl Asker {
             now.clocks.exchange(sent_ns, time.now_ns, received_ns);
             now.is_here = time.boot == boot();
             now.unix_offset_ns = time.unix_offset_ns;
+            now.take_robot_time(time.robot.at_ns, Duration::from_nanos(time.robot.ns));
         }
     }
 }

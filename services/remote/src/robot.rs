@@ -35,7 +35,7 @@ use crate::limit::{Limit, Verdict};
 use crate::note::{Counts, Note, layout_number};
 use crate::session::{self, ZenohError};
 use crate::settings::{Proof, Settings};
-use crate::told::{About, Beat, Ends, Kind, Time};
+use crate::told::{About, Beat, Ends, Kind, RobotTime, Time};
 
 /// How often it tells what it has counted.
 const BEAT: Duration = Duration::from_secs(1);
@@ -266,7 +266,10 @@ struct Outlet {
 
 /// What queries are answered with.
 #[derive(Default)]
-struct Shelf(Mutex<HashMap<KeyExpr<'static>, Answer>>);
+struct Shelf {
+    answers: Mutex<HashMap<KeyExpr<'static>, Answer>>,
+    robot: Mutex<RobotTime>,
+}
 
 #[derive(Clone, PartialEq)]
 struct Answer {
@@ -276,7 +279,16 @@ struct Answer {
 
 impl Shelf {
     fn lock(&self) -> MutexGuard<'_, HashMap<KeyExpr<'static>, Answer>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.answers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn show(&self, robot: RobotTime) {
+        *self.robot.lock().unwrap_or_else(PoisonError::into_inner) = robot;
+    }
+
+    fn time(&self) -> Time {
+        let robot = *self.robot.lock().unwrap_or_else(PoisonError::into_inner);
+        Time::now(robot)
     }
 
     /// Returns whether it was not there or another one.
@@ -432,9 +444,14 @@ impl Carrier {
         }
     }
 
-    /// Sends what is due at this time: states that were held, and a beat with the robot's own time.
+    /// Sends what is due at this time, `robot` by the robot's own clock: states that were held, and a
+    /// beat.
     pub fn tick(&mut self, robot: Duration) {
         let now_ns = Clock::monotonic_ns();
+        self.shelf.show(RobotTime {
+            ns: u64::try_from(robot.as_nanos()).unwrap_or(u64::MAX),
+            at_ns: now_ns,
+        });
         for outlet in self.outlets.values_mut() {
             if outlet.limit.is_due(now_ns)
                 && let Some((stamp, lost, payload)) = outlet.held.take()
@@ -457,7 +474,6 @@ impl Carrier {
             run: self.run,
             number: self.beat,
             now_ns,
-            robot_ns: u64::try_from(robot.as_nanos()).unwrap_or(u64::MAX),
             about: self.about,
             topics: outlets
                 .map(|(name, outlet)| (name.clone(), outlet.counts.into()))
@@ -532,7 +548,7 @@ impl Drop for Carrier {
 fn answer(asked: &Receiver<Query>, shelf: &Shelf, time: &str) {
     for query in asked {
         if query.key_expr().as_str() == time {
-            let now = serde_json::to_vec(&Time::now()).expect("it is JSON");
+            let now = serde_json::to_vec(&shelf.time()).expect("it is JSON");
             let _ = query.reply(time, now).wait();
             continue;
         }

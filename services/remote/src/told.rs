@@ -57,15 +57,27 @@ pub struct Time {
     pub unix_offset_ns: i64,
     /// Which machine's clock that is, for as long as it runs: Linux's boot id.
     pub boot: String,
+    /// The robot's own time a moment ago.
+    pub robot: RobotTime,
+}
+
+/// The robot's own time, which runs slower or faster, as `--speed` says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RobotTime {
+    /// In ns.
+    pub ns: u64,
+    /// When it was that, by the robot's `CLOCK_MONOTONIC` in ns.
+    pub at_ns: u64,
 }
 
 impl Time {
     /// Now, on this machine.
-    pub fn now() -> Self {
+    pub fn now(robot: RobotTime) -> Self {
         Self {
             now_ns: Clock::monotonic_ns(),
             unix_offset_ns: Clock::unix_offset_ns(),
             boot: boot(),
+            robot,
         }
     }
 }
@@ -81,8 +93,6 @@ pub struct Beat {
     pub number: u64,
     /// The robot's `CLOCK_MONOTONIC` now, in ns.
     pub now_ns: u64,
-    /// The robot's own time at that moment, in ns: slower or faster, as `--speed` says.
-    pub robot_ns: u64,
     /// How often what it tells of topics has changed in this run.
     pub about: u64,
     /// What it has counted of each topic.
@@ -145,11 +155,10 @@ mod tests {
             run: 5,
             number: 7,
             now_ns: 11,
-            robot_ns: 12,
             about: 2,
             topics: [("sensor/line".to_owned(), counts.into())].into(),
         };
-        let text = r#"{"robot":"r1","run":5,"number":7,"now_ns":11,"robot_ns":12,"about":2,"topics":{"sensor/line":{"next":3,"left_out":2,"lost":1}}}"#;
+        let text = r#"{"robot":"r1","run":5,"number":7,"now_ns":11,"about":2,"topics":{"sensor/line":{"next":3,"left_out":2,"lost":1}}}"#;
         assert_eq!(serde_json::to_string(&beat).expect("JSON"), text);
         assert_eq!(serde_json::from_str::<Beat>(text).expect("a beat"), beat);
         assert_eq!(beat.counts("sensor/line"), Some(counts));
@@ -157,7 +166,7 @@ mod tests {
         let about = r#"{"layout":"A{a:u8}","state":true,"rate":null,"ends":{"publishers":1,"subscribers":2,"observers":1,"writers":{"7":"bridge"},"readers":{},"woken":{"8":"logic"}}}"#;
         let read: About = serde_json::from_str(about).expect("it reads");
         assert_eq!(serde_json::to_string(&read).expect("JSON"), about);
-        let time = r#"{"now_ns":11,"unix_offset_ns":-13,"boot":"b"}"#;
+        let time = r#"{"now_ns":11,"unix_offset_ns":-13,"boot":"b","robot":{"ns":5,"at_ns":6}}"#;
         let read: Time = serde_json::from_str(time).expect("it reads");
         assert_eq!(serde_json::to_string(&read).expect("JSON"), time);
     }

@@ -21,7 +21,7 @@ use super::head::Load;
 use super::model::{Key, Model, Pressed};
 use super::render;
 use super::{Lacking, Recorded};
-use crate::life::Failing;
+use crate::life::{Failing, Life};
 
 const MS: u64 = 1_000_000;
 const S: u64 = 1_000 * MS;

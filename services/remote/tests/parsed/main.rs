@@ -33,9 +33,9 @@ fn said() -> Vec<Vec<u8>> {
         note.to_bytes().to_vec()
     };
     let texts = [
-        r#"{"robot":"r1","run":5,"number":7,"now_ns":11,"robot_ns":12,"about":2,"topics":{"a/b":{"next":3,"left_out":2,"lost":1}}}"#,
+        r#"{"robot":"r1","run":5,"number":7,"now_ns":11,"about":2,"topics":{"a/b":{"next":3,"left_out":2,"lost":1}}}"#,
         r#"{"layout":"A{a:[B{c:u16,d:T<X,7=Y>};2]}","state":true,"rate":0.5,"ends":{"publishers":1,"subscribers":2,"observers":1,"writers":{"7":"bridge"},"readers":{},"woken":{}}}"#,
-        r#"{"now_ns":11,"unix_offset_ns":-13,"boot":"b"}"#,
+        r#"{"now_ns":11,"unix_offset_ns":-13,"boot":"b","robot":{"ns":5,"at_ns":6}}"#,
         "tls/[::1]:7447",
         "unixsock-stream//run/lager/zenoh",
     ];
