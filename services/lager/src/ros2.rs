@@ -36,7 +36,10 @@ pub fn become_it(config: &Config, args: &GatewayArgs, global: &GlobalArgs) -> Re
         ("--speed", running.speed.to_string()),
         ("--ranger-least-cm", least.to_string()),
         ("--ranger-most-cm", most.to_string()),
-        ("--ranger-ahead-mm", running.logic.ranger_ahead_mm.to_string()),
+        (
+            "--ranger-ahead-mm",
+            running.logic.ranger_ahead_mm.to_string(),
+        ),
         ("--line-ahead-mm", running.logic.sensor_ahead_mm.to_string()),
         ("--cells", pack.cells.to_string()),
     ] {
@@ -65,9 +68,19 @@ pub fn become_it(config: &Config, args: &GatewayArgs, global: &GlobalArgs) -> Re
 /// This program with the flags by which it finds the same robot.
 fn own_command(config: &Config, global: &GlobalArgs) -> Result<Vec<OsString>> {
     let own = std::env::current_exe().context("cannot find this program's own file")?;
-    let mut command = vec![own.into_os_string(), "--name".into(), config.name.clone().into()];
+    let mut command = vec![
+        own.into_os_string(),
+        "--name".into(),
+        config.name.clone().into(),
+    ];
     let files = [
-        ("--config", global.config.as_deref().filter(|file| *file != Path::new("-"))),
+        (
+            "--config",
+            global
+                .config
+                .as_deref()
+                .filter(|file| *file != Path::new("-")),
+        ),
         ("--bus", config.bus.folder.as_deref()),
         ("--state", config.state.as_deref()),
     ];
