@@ -9,6 +9,8 @@ import unittest
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from std_srvs.srv import Trigger
+
 from robot import Robot, domain, peer, until
 from test_topics import Listener
 
@@ -45,12 +47,13 @@ class ComingAndGoing(unittest.TestCase):
         node = listener.node
         shown = lambda: "r1" in node.get_node_names() and node.count_publishers("/r1/range")
         gone = lambda: "r1" not in node.get_node_names() and not node.count_publishers("/r1/range")
+        stop = node.create_client(Trigger, "/r1/stop")
         for how in (signal.SIGINT, signal.SIGTERM):
             gateway = robot.gateway(number)
-            listener.spin(found=shown)
+            listener.spin(found=lambda: shown() and stop.service_is_ready())
             self.assertEqual(gateway.end(how), 0)
             began = time.monotonic()
-            listener.spin(found=gone)
+            listener.spin(found=lambda: gone() and not stop.service_is_ready())
             took = time.monotonic() - began
             print(f"gone {took:.2f} s after {how.name}", file=sys.stderr)
             # Its lease is 50 s: this was its word.

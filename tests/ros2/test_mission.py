@@ -18,8 +18,9 @@ LASTING = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-# Lets what is told of the robot differ from where it is, in m and in m/s.
-OFF, OFF_SPEED = 0.08, 0.03
+# How far the robot may be from where it believes to be, in m, and how far its speed from the true one,
+# as a part of that, half of the time: at a mark it learns better, which looks like a jerk.
+OFF, OFF_SPEED = 0.08, 0.05
 
 
 def cell(grid, x, y):
@@ -108,7 +109,7 @@ class Mission(unittest.TestCase):
     def test_odometry_is_near_the_truth_in_place_and_in_speed_whichever_way_it_drives(self):
         truth = {ns(one.header.stamp): one for one in self.heard("/r1/ground_truth")}
         times = sorted(truth)
-        looks, off, straight = set(), [], 0
+        looks, off = {}, []
         window = 400_000_000
         for odom in self.heard("/r1/odom"):
             at = ns(odom.header.stamp)
@@ -123,15 +124,17 @@ class Mission(unittest.TestCase):
             if even and speeds[0].linear.x > 0.05 and max(abs(one.angular.z) for one in speeds) < 0.1:
                 mean = sum(one.linear.x for one in speeds) / len(speeds)
                 turn = odom.pose.pose.orientation
-                looks.add(round(math.degrees(2 * math.atan2(turn.z, turn.w))) % 360)
-                self.assertLess(abs(odom.twist.twist.linear.x - mean), OFF_SPEED, (odom, mean))
-                straight += 1
+                look = round(math.degrees(2 * math.atan2(turn.z, turn.w))) % 360
+                wrong = abs(odom.twist.twist.linear.x - mean) / mean
+                looks.setdefault(look, []).append(wrong)
             self.assertLess(abs(odom.twist.twist.linear.y), 0.02)
         off.sort()
         print(f"odometry is {off[len(off) // 2] * 1e3:.0f} mm off, half of the time", file=sys.stderr)
         self.assertLess(off[len(off) // 2], OFF)
-        self.assertGreater(straight, 100)
-        self.assertGreaterEqual(len(looks), 2, looks)
+        often = {look: sorted(wrong) for look, wrong in looks.items() if len(wrong) > 20}
+        self.assertGreaterEqual(len(often), 2, looks.keys())
+        for look, wrong in often.items():
+            self.assertLess(wrong[len(wrong) // 2], OFF_SPEED, look)
 
     def test_a_listener_of_another_origin_gets_the_whole_tree_of_frames(self):
         fixed, moved = self.frames["fixed"], self.frames["moved"]

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use lager_ros2::messages::*;
-use rustdds::cdr_encoding::to_vec;
-use rustdds::serialization::LittleEndian;
+use rustdds::CDRSerializerAdapter;
+use rustdds::no_key::SerializerAdapter;
 use serde::Serialize;
 
 fn header(frame_id: &str) -> Header {
@@ -86,14 +86,11 @@ fn marker() -> Marker {
 }
 
 /// The bytes of a message as they are sent, with the four that name the encoding.
-fn bytes(message: &impl Serialize) -> String {
-    let body = to_vec::<_, LittleEndian>(message);
-    let body = body.expect("a message");
+fn bytes<M: Serialize>(message: &M) -> String {
+    let body = CDRSerializerAdapter::<M>::to_bytes(message).expect("a message");
     let head = [0, 1, 0, 0];
-    head.iter()
-        .chain(&body)
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    let bytes = head.iter().chain(&body);
+    bytes.map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[test]
