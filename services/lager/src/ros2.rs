@@ -91,3 +91,36 @@ fn own_command(config: &Config, global: &GlobalArgs) -> Result<Vec<OsString>> {
     }
     Ok(command)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_operators_command_finds_the_same_robot_from_any_folder() {
+        let mut config = Config::default();
+        config.name = "r7".to_owned();
+        config.bus.folder = Some("bus".into());
+        let global = GlobalArgs {
+            config: Some("-".into()),
+            name: None,
+            bus: None,
+            state: None,
+            log: None,
+            log_json: false,
+        };
+        let command = own_command(&config, &global).expect("a command");
+        let folder = std::path::absolute("bus").expect("a path");
+        let told: Vec<_> = command[1..].iter().map(|word| word.as_os_str()).collect();
+        // Nobody gives the configuration on standard input a second time.
+        assert_eq!(
+            told,
+            [
+                "--name".as_ref(),
+                "r7".as_ref(),
+                "--bus".as_ref(),
+                folder.as_os_str()
+            ]
+        );
+    }
+}
