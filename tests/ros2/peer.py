@@ -1,6 +1,7 @@
 """A program of ROS 2 that starts, does one thing, prints one line of JSON and ends.
 
 late TOPIC TYPE SECONDS   subscribes as for a map; tells how many messages came, and their hashes
+listen TOPIC TYPE SECONDS subscribes reliably; tells how many messages came
 call SERVICE [SECONDS]    waits for the service, calls it once at once, tells the answer
 nodes                     tells which nodes there are
 """
@@ -36,6 +37,17 @@ def late(node, topic, kind, seconds):
             end = min(end, time.monotonic() + 0.5)
     hashes = [hashlib.sha256(serialize_message(one)).hexdigest() for one in came]
     return {"count": len(came), "hashes": hashes}
+
+
+def listen(node, topic, kind, seconds):
+    came = []
+    node.create_subscription(named(kind), topic, came.append, 10)
+    end = time.monotonic() + float(seconds)
+    while time.monotonic() < end:
+        rclpy.spin_once(node, timeout_sec=0.05)
+        if len(came) == 1:
+            print("listens", flush=True)
+    return {"count": len(came)}
 
 
 def call(node, service, seconds="10"):

@@ -36,7 +36,10 @@ pub fn become_it(config: &Config, args: &GatewayArgs, global: &GlobalArgs) -> Re
         ("--speed", running.speed.to_string()),
         ("--ranger-least-cm", least.to_string()),
         ("--ranger-most-cm", most.to_string()),
-        ("--ranger-ahead-mm", running.logic.ranger_ahead_mm.to_string()),
+        (
+            "--ranger-ahead-mm",
+            running.logic.ranger_ahead_mm.to_string(),
+        ),
         ("--line-ahead-mm", running.logic.sensor_ahead_mm.to_string()),
         ("--cells", pack.cells.to_string()),
     ] {
@@ -65,9 +68,19 @@ pub fn become_it(config: &Config, args: &GatewayArgs, global: &GlobalArgs) -> Re
 /// This program with the flags by which it finds the same robot.
 fn own_command(config: &Config, global: &GlobalArgs) -> Result<Vec<OsString>> {
     let own = std::env::current_exe().context("cannot find this program's own file")?;
-    let mut command = vec![own.into_os_string(), "--name".into(), config.name.clone().into()];
+    let mut command = vec![
+        own.into_os_string(),
+        "--name".into(),
+        config.name.clone().into(),
+    ];
     let files = [
-        ("--config", global.config.as_deref().filter(|file| *file != Path::new("-"))),
+        (
+            "--config",
+            global
+                .config
+                .as_deref()
+                .filter(|file| *file != Path::new("-")),
+        ),
         ("--bus", config.bus.folder.as_deref()),
         ("--state", config.state.as_deref()),
     ];
@@ -77,4 +90,37 @@ fn own_command(config: &Config, global: &GlobalArgs) -> Result<Vec<OsString>> {
         }
     }
     Ok(command)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_operators_command_finds_the_same_robot_from_any_folder() {
+        let mut config = Config::default();
+        config.name = "r7".to_owned();
+        config.bus.folder = Some("bus".into());
+        let global = GlobalArgs {
+            config: Some("-".into()),
+            name: None,
+            bus: None,
+            state: None,
+            log: None,
+            log_json: false,
+        };
+        let command = own_command(&config, &global).expect("a command");
+        let folder = std::path::absolute("bus").expect("a path");
+        let told: Vec<_> = command[1..].iter().map(|word| word.as_os_str()).collect();
+        // Nobody gives the configuration on standard input a second time.
+        assert_eq!(
+            told,
+            [
+                "--name".as_ref(),
+                "r7".as_ref(),
+                "--bus".as_ref(),
+                folder.as_os_str()
+            ]
+        );
+    }
 }

@@ -53,7 +53,9 @@ pub fn run(config: &Config, cause: StopCause) -> Result<String> {
             continue;
         };
         let now_ns = Clock::monotonic_ns();
-        let bridge = told.bridge().map(|process| (process, process_state(process)));
+        let bridge = told
+            .bridge()
+            .map(|process| (process, process_state(process)));
         let why = match judge(&told, ordered_ns, now_ns, bridge) {
             Verdict::Stands(said) => return Ok(said),
             Verdict::Never(why) => bail!("{MOVING}: {why}"),

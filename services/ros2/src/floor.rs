@@ -58,8 +58,8 @@ pub fn grid(
         };
         let room = grid.room;
         let beside = |at: f64, most: f64| (-room..=most + room).contains(&at);
-        let is_way = (off(x, right) <= room && beside(y, top))
-            || (off(y, top) <= room && beside(x, right));
+        let is_way =
+            (off(x, right) <= room && beside(y, top)) || (off(y, top) <= room && beside(x, right));
         match () {
             () if things.iter().any(is_in) => OCCUPIED,
             () if is_way => FREE,
@@ -103,7 +103,8 @@ impl Measured {
     fn new(side: f64, fine: u32, [columns, rows]: [u32; 2]) -> Self {
         let cell = side / f64::from(fine);
         let room = ROOM.max(cell / 2.0);
-        let margin = (room / cell).ceil() as u32;
+        // One cell beyond the ways shows that nothing is known there.
+        let margin = (room / cell).ceil() as u32 + 1;
         Self {
             cell,
             origin: -f64::from(margin) * cell,
@@ -271,17 +272,20 @@ mod tests {
         assert_eq!(grid.data.len() as u32, grid.info.width * grid.info.height);
         assert!(grid.info.width > grid.info.height);
         for ((x, y), expected) in [
-            ((0.0, 0.0), FREE),        // a corner
-            ((0.3, 0.3), OCCUPIED),    // a shelf
-            ((2.4, 0.7), FREE),        // the rightmost way
-            ((0.9, 1.2), OCCUPIED),    // what blocks the way
-            ((0.9, 0.6), FREE),        // the way below it
-            ((1.5, 1.2), FREE),        // the next way
-            ((-0.17, 0.3), UNKNOWN),   // outside
+            ((0.0, 0.0), FREE),      // a corner
+            ((0.3, 0.3), OCCUPIED),  // a shelf
+            ((2.4, 0.7), FREE),      // the rightmost way
+            ((0.9, 1.2), OCCUPIED),  // what blocks the way
+            ((0.9, 0.6), FREE),      // the way below it
+            ((1.5, 1.2), FREE),      // the next way
+            ((-0.17, 0.3), UNKNOWN), // outside
         ] {
             assert_eq!(at(&grid, x, y), expected, "({x}, {y})");
         }
-        assert_eq!(grid.info.origin.orientation, crate::messages::Quaternion::default());
+        assert_eq!(
+            grid.info.origin.orientation,
+            crate::messages::Quaternion::default()
+        );
         assert!(grid.data.iter().all(|cell| (-1..=100).contains(cell)));
     }
 
@@ -306,7 +310,13 @@ mod tests {
         let kinds: Vec<i32> = markers[1..].iter().map(|marker| marker.kind).collect();
         assert_eq!(
             kinds,
-            [Marker::LINE_LIST, Marker::CUBE, Marker::CUBE, Marker::TEXT, Marker::TEXT]
+            [
+                Marker::LINE_LIST,
+                Marker::CUBE,
+                Marker::CUBE,
+                Marker::TEXT,
+                Marker::TEXT
+            ]
         );
         assert_eq!(markers[1].points.len(), 2 * (4 + 1 + 3 + 1));
         assert!(markers.iter().any(|marker| marker.text == "7"));
@@ -323,7 +333,10 @@ mod tests {
     fn bodies_stand_in_the_robots_frames() {
         let scene = drawn::bodies(shapes::Time::of_ns(5));
         let MarkerArray { markers } = markers(&scene, AT, &Frames::of("r2"));
-        let frames: Vec<_> = markers.iter().map(|one| one.header.frame_id.as_str()).collect();
+        let frames: Vec<_> = markers
+            .iter()
+            .map(|one| one.header.frame_id.as_str())
+            .collect();
         assert!(frames.contains(&"r2/base_link") && frames.contains(&"r2/ground_truth"));
     }
 

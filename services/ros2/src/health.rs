@@ -59,11 +59,18 @@ pub fn diagnostics(
 ) -> DiagnosticArray {
     let robot = frames.robot();
     let is_fresh = |at_ns: u64| StopTold::age(now_ns, at_ns) <= STALE;
-    let health = health.as_ref().map(|(health, at_ns)| (health, is_fresh(*at_ns)));
-    let status = status.as_ref().map(|(status, at_ns)| (status, is_fresh(*at_ns)));
+    let health = health
+        .as_ref()
+        .map(|(health, at_ns)| (health, is_fresh(*at_ns)));
+    let status = status
+        .as_ref()
+        .map(|(status, at_ns)| (status, is_fresh(*at_ns)));
     let mut all = Vec::new();
     for (name, of) in [
-        ("sensor board", (|of| &of.sensor) as fn(&Health) -> &BoardHealth),
+        (
+            "sensor board",
+            (|of| &of.sensor) as fn(&Health) -> &BoardHealth,
+        ),
         ("steering board", |of| &of.steering),
     ] {
         all.push(match health {
@@ -79,7 +86,11 @@ pub fn diagnostics(
         Some((status, true)) => navigator(status),
         _ => part("navigator", SILENT, "the navigator is silent", &[]),
     });
-    all.push(losses(health.map(|(health, _)| health), status.map(|(it, _)| it), gateway));
+    all.push(losses(
+        health.map(|(health, _)| health),
+        status.map(|(it, _)| it),
+        gateway,
+    ));
     all.push(own(gateway, calendar));
     for status in &mut all {
         status.name = format!("{robot}: {}", status.name);
@@ -146,11 +157,19 @@ fn stop(health: &Health, now_ns: u64) -> DiagnosticStatus {
         };
         return part("stop", level, message, &[("mode", &mode)]);
     }
-    let who = health.stop_origin.get().map_or("nobody known", Role::as_author);
+    let who = health
+        .stop_origin
+        .get()
+        .map_or("nobody known", Role::as_author);
     let why = health.stop_cause.get().unwrap_or(StopCause::WordDamaged);
     let since = StopTold::age(now_ns, health.stopped_at_ns).as_secs();
     let message = format!("stopped by {who} ({why}); `lager resume` lets it go on");
-    part("stop", WARN, message, &[("mode", &mode), ("since, in s", &since)])
+    part(
+        "stop",
+        WARN,
+        message,
+        &[("mode", &mode), ("since, in s", &since)],
+    )
 }
 
 fn navigator(status: &NavigatorStatus) -> DiagnosticStatus {
@@ -189,7 +208,9 @@ fn losses(
         (0, 0) => (OK, "nothing is lost on the way out".to_owned()),
         _ => (
             WARN,
-            format!("the gateway missed {lost} samples of the bus, and had no room for {refused} messages"),
+            format!(
+                "the gateway missed {lost} samples of the bus, and had no room for {refused} messages"
+            ),
         ),
     };
     let mut status = part(
@@ -197,8 +218,14 @@ fn losses(
         level,
         message,
         &[
-            ("lost by the bridge", &health.map_or(0, |health| health.bus_lost)),
-            ("lost by the navigator", &status.map_or(0, |status| status.frames_lost)),
+            (
+                "lost by the bridge",
+                &health.map_or(0, |health| health.bus_lost),
+            ),
+            (
+                "lost by the navigator",
+                &status.map_or(0, |status| status.frames_lost),
+            ),
         ],
     );
     for passed in &gateway.passed {

@@ -113,7 +113,9 @@ fn begin(args: Args) -> Result<(), Failure> {
     }
     let watchdog = Watchdog::start_in_order(CALL, &shutdown, |why| {
         if let GivenUp::Hung { what } = why {
-            voice::complain(&format!("{what} took too long; is the bus damaged? (`lager doctor`)"));
+            voice::complain(&format!(
+                "{what} took too long; is the bus damaged? (`lager doctor`)"
+            ));
         }
         std::process::exit(1);
     })

@@ -72,7 +72,10 @@ impl Motion {
         (calendar, at_ns): (Calendar, u64),
         frames: &Frames,
     ) -> Option<Moved> {
-        let is_lost = matches!(status.phase.get(), None | Some(Phase::Lost | Phase::WaitingForMap));
+        let is_lost = matches!(
+            status.phase.get(),
+            None | Some(Phase::Lost | Phase::WaitingForMap)
+        );
         let Some(believed) = status.pose(map).filter(|_| !is_lost) else {
             self.seen.clear();
             return None;
@@ -94,10 +97,18 @@ impl Motion {
         let heading = 2.0 * pose.orientation.z.atan2(pose.orientation.w);
         // A clock that went back, or a long silence: what was before tells no speed.
         let is_old = |then_ns: u64| at_ns.saturating_sub(then_ns) > WINDOW.as_nanos() as u64;
-        if self.seen.back().is_some_and(|(then_ns, ..)| *then_ns >= at_ns) {
+        if self
+            .seen
+            .back()
+            .is_some_and(|(then_ns, ..)| *then_ns >= at_ns)
+        {
             self.seen.clear();
         }
-        while self.seen.front().is_some_and(|(then_ns, ..)| is_old(*then_ns)) {
+        while self
+            .seen
+            .front()
+            .is_some_and(|(then_ns, ..)| is_old(*then_ns))
+        {
             self.seen.pop_front();
         }
         let heading = match self.seen.back() {
@@ -182,7 +193,11 @@ pub fn fixed(
     };
     let transforms = [
         (frames.map(), frames.odom(), Transform::default()),
-        (frames.base(), frames.ranger(), ahead(measures.ranger_ahead_mm)),
+        (
+            frames.base(),
+            frames.ranger(),
+            ahead(measures.ranger_ahead_mm),
+        ),
         (frames.base(), frames.line(), ahead(measures.line_ahead_mm)),
     ];
     let transforms = transforms.map(|(frame, child_frame_id, transform)| TransformStamped {
@@ -265,7 +280,10 @@ mod tests {
         for heading in Heading::ALL {
             let moved = driven(heading);
             let twist = moved.odometry.twist.twist;
-            assert!((twist.linear.x - 0.2).abs() < 0.002, "{heading:?} {twist:?}");
+            assert!(
+                (twist.linear.x - 0.2).abs() < 0.002,
+                "{heading:?} {twist:?}"
+            );
             assert!(twist.linear.y == 0.0 && twist.angular.z.abs() < 1e-9);
             let Quaternion { x, y, z, w } = moved.pose.pose.orientation;
             assert!((x * x + y * y + z * z + w * w - 1.0).abs() < 1e-9);
@@ -273,7 +291,10 @@ mod tests {
             assert_eq!(moved.odometry.header.frame_id, "r1/odom");
         }
         let up = driven(Heading::Up).pose.pose.position;
-        assert!((up.x - 0.8).abs() < 1e-9 && (up.y - 0.59).abs() < 1e-9, "{up:?}");
+        assert!(
+            (up.x - 0.8).abs() < 1e-9 && (up.y - 0.59).abs() < 1e-9,
+            "{up:?}"
+        );
     }
 
     #[test]
@@ -291,7 +312,10 @@ mod tests {
             let moved = motion.take(&status, &map(), at, &Frames::of("r1"));
             twist = moved.expect("a place").odometry.twist.twist;
         }
-        assert!((twist.angular.z - 40f64.to_radians()).abs() < 0.01, "{twist:?}");
+        assert!(
+            (twist.angular.z - 40f64.to_radians()).abs() < 0.01,
+            "{twist:?}"
+        );
         assert_eq!(twist.linear.x, 0.0);
     }
 

@@ -25,8 +25,7 @@ use rustdds::policy::{Durability, History, Reliability, ResourceLimits};
 use rustdds::{
     DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent,
     DomainParticipantStatusListener, GUID, Publisher, QosPolicies, QosPolicyBuilder, RTPSEntity,
-    SampleIdentity, StatusEvented, Subscriber, Timestamp, TopicKind,
-    WriteOptionsBuilder,
+    SampleIdentity, StatusEvented, Subscriber, Timestamp, TopicKind, WriteOptionsBuilder,
 };
 
 use crate::messages::{RosType, TRIGGER, TriggerRequest, TriggerResponse};
@@ -247,7 +246,8 @@ impl Node {
                 }
                 DomainParticipantStatusEvent::ParticipantLost { id, .. } => {
                     let gone = participant_of(GUID::new(id, self.participant.guid().entity_id));
-                    self.matched.retain(|(_, reader)| participant_of(*reader) != gone);
+                    self.matched
+                        .retain(|(_, reader)| participant_of(*reader) != gone);
                 }
                 DomainParticipantStatusEvent::RemoteReaderQosIncompatible {
                     local_writer,
@@ -272,9 +272,7 @@ impl Node {
             () if is_reliable(wanted) && !is_reliable(&offers) => {
                 "it is best effort; ask for reliability best effort"
             }
-            () if lasts(wanted) && !lasts(&offers) => {
-                "it is volatile; ask for durability volatile"
-            }
+            () if lasts(wanted) && !lasts(&offers) => "it is volatile; ask for durability volatile",
             () => "it has another quality of service",
         };
         let now = Instant::now();
@@ -283,7 +281,9 @@ impl Node {
             return None;
         }
         self.complaints.insert(topic.clone(), now);
-        Some(format!("somebody who listens to {topic} gets nothing: {policy}"))
+        Some(format!(
+            "somebody who listens to {topic} gets nothing: {policy}"
+        ))
     }
 
     /// Whether the program that sent a request hears the answers of this service.
@@ -313,8 +313,12 @@ impl Node {
     ) -> Result<E, NodeError> {
         let participant = &self.participant;
         let policies = quality.policies();
-        let topic =
-            participant.create_topic(name.to_owned(), kind.to_owned(), &policies, TopicKind::NoKey);
+        let topic = participant.create_topic(
+            name.to_owned(),
+            kind.to_owned(),
+            &policies,
+            TopicKind::NoKey,
+        );
         topic
             .and_then(|topic| make(self, &topic))
             .map_err(|error| NodeError::Endpoint {
@@ -395,7 +399,10 @@ impl Server {
     /// What came is no request.
     pub fn receive(&self) -> Result<Option<Asked>, String> {
         self.requests.drain_read_notifications();
-        let came = self.requests.try_take_one().map_err(|error| error.to_string())?;
+        let came = self
+            .requests
+            .try_take_one()
+            .map_err(|error| error.to_string())?;
         Ok(came.map(|came| {
             let info = MessageInfo::from(&came);
             // Fast DDS names its reader of answers here, but not always the number of the request.
@@ -409,7 +416,10 @@ impl Server {
             }
             let at_ns = info.source_timestamp();
             let at_ns = at_ns.and_then(|at| u64::try_from(at.to_nanos()).ok());
-            Asked { by: Asker(by), at_ns }
+            Asked {
+                by: Asker(by),
+                at_ns,
+            }
         }))
     }
 

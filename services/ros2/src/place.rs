@@ -136,7 +136,10 @@ mod tests {
     fn without_a_word_it_is_this_machine_alone() {
         let place = place(None, None, &[]).expect("a place");
         assert_eq!((place.domain, place.reach), (0, Reach::Localhost));
-        assert_eq!(place.to_string(), "domain 0, range LOCALHOST: this machine alone");
+        assert_eq!(
+            place.to_string(),
+            "domain 0, range LOCALHOST: this machine alone"
+        );
     }
 
     #[test]
@@ -150,7 +153,10 @@ mod tests {
         let flagged = place(Some(7), Some(Reach::Localhost), &set).expect("a place");
         assert_eq!((flagged.domain, flagged.reach), (7, Reach::Localhost));
         let older = [set[1], ("ROS_LOCALHOST_ONLY", "1")];
-        assert_eq!(place(None, None, &older).expect("a place").reach, Reach::Localhost);
+        assert_eq!(
+            place(None, None, &older).expect("a place").reach,
+            Reach::Localhost
+        );
     }
 
     #[test]
@@ -158,8 +164,16 @@ mod tests {
         for (name, said, words) in [
             ("ROS_DOMAIN_ID", "233", "from 0 to 232"),
             ("ROS_DOMAIN_ID", "one", "ROS_DOMAIN_ID is `one`"),
-            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "no program would find"),
-            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "WORLD", "LOCALHOST or SUBNET"),
+            (
+                "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                "OFF",
+                "no program would find",
+            ),
+            (
+                "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                "WORLD",
+                "LOCALHOST or SUBNET",
+            ),
         ] {
             let refused = place(None, None, &[(name, said)]).expect_err("no place");
             assert!(refused.to_string().contains(words), "{refused}");

@@ -14,9 +14,9 @@ use lager_ports::{Bus, OpenError, PortError, ReceiveError, Source as _, Subscrib
 use lager_sample::{Part, Topic};
 use lager_stop::StopPage;
 use lager_topics::{
-    BlockedWays, Health, LinkHealth, LogThought, NavBlocks, NavMap, NavRoute, NavStatus,
-    NavigatorStatus, Role, Route, SensorDistance, SensorLine, SteeringState, Truth, TruthPose,
-    WarehouseMap,
+    BlockedWay, BlockedWays, Health, LinkHealth, LogThought, NavBlocks, NavMap, NavRoute,
+    NavStatus, NavigatorStatus, Role, Route, SensorDistance, SensorLine, SteeringState, Truth,
+    TruthPose, WarehouseMap,
 };
 use lager_wake::{Pace, Shutdown, Watchdog};
 
@@ -241,7 +241,9 @@ pub fn run(
     let fixed = motion::fixed(&settings.measures, (calendar, started), &frames);
     writers.tf_static.send(fixed);
     let bodies = drawn::bodies(Time::of_ns(calendar.unix_ns(started)));
-    writers.bodies.send(floor::markers(&bodies, (calendar, started), &frames));
+    writers
+        .bodies
+        .send(floor::markers(&bodies, (calendar, started), &frames));
     ready(&format!(
         "the robot is the node /{} of ROS 2 in {}; stamps are CLOCK_MONOTONIC plus {} ns",
         settings.name,
@@ -281,7 +283,9 @@ pub fn run(
             let left_out = services.map(&mut node, map)?;
             node.announce();
             if left_out > 0 {
-                log::warn!("{left_out} products have no service, as there are too many; `lager fetch` fetches them");
+                log::warn!(
+                    "{left_out} products have no service, as there are too many; `lager fetch` fetches them"
+                );
             }
         }
         for said in node.look() {
@@ -318,9 +322,12 @@ impl Feeds {
     ) -> Result<bool, ReceiveError> {
         let mut has_map = false;
         // The map first: poses stand on it.
-        self.map.drain(pace, |map, at| has_map |= to.map(map, (calendar, at)))?;
-        self.blocks.drain(pace, |ways, at| to.blocks(ways, (calendar, at)))?;
-        self.route.drain(pace, |route, at| to.route(route, (calendar, at)))?;
+        self.map
+            .drain(pace, |map, at| has_map |= to.map(map, (calendar, at)))?;
+        self.blocks
+            .drain(pace, |ways, at| to.blocks(ways, (calendar, at)))?;
+        self.route
+            .drain(pace, |route, at| to.route(route, (calendar, at)))?;
         self.distance.drain(pace, |frame, at| {
             let range = parts::range(frame, to.measures, (calendar, at), to.frames);
             to.writers.range.send(range);
@@ -329,13 +336,19 @@ impl Feeds {
             to.writers.line.send(parts::line(frame));
             to.writers.line_state.send(parts::line_state(frame));
         })?;
-        self.steering.drain(pace, |report, at| to.steering(report, (calendar, at)))?;
-        self.health.drain(pace, |health, at| to.health(health, (calendar, at)))?;
-        self.status.drain(pace, |status, at| to.status(status, (calendar, at)))?;
+        self.steering
+            .drain(pace, |report, at| to.steering(report, (calendar, at)))?;
+        self.health
+            .drain(pace, |health, at| to.health(health, (calendar, at)))?;
+        self.status
+            .drain(pace, |status, at| to.status(status, (calendar, at)))?;
         self.thoughts.drain(pace, |thought, at| {
-            to.writers.rosout.send(floor::log(thought, (calendar, at), to.frames));
+            to.writers
+                .rosout
+                .send(floor::log(thought, (calendar, at), to.frames));
         })?;
-        self.truth.drain(pace, |truth, at| to.truth(truth, (calendar, at)))?;
+        self.truth
+            .drain(pace, |truth, at| to.truth(truth, (calendar, at)))?;
         Ok(has_map)
     }
 }
@@ -360,7 +373,9 @@ impl Sender<'_> {
         }
         self.known.map = Some(Box::new(*map));
         let scene = drawn::map(map, time(at));
-        self.writers.floor.send(floor::markers(&scene, at, self.frames));
+        self.writers
+            .floor
+            .send(floor::markers(&scene, at, self.frames));
         self.draw_blocks(at);
         if let Some(route) = self.known.route.take() {
             self.route(&route, at);
@@ -369,8 +384,11 @@ impl Sender<'_> {
     }
 
     fn blocks(&mut self, ways: &BlockedWays, at: At) {
-        if self.known.blocks.as_deref() != Some(ways) {
-            self.known.blocks = Some(Box::new(*ways));
+        // How often the robot has tried them is not drawn.
+        let shown = |way: &BlockedWay| (way.x, way.y, way.heading, way.source);
+        let last = self.known.blocks.replace(Box::new(*ways));
+        let last = last.iter().flat_map(|last| last.ways()).map(shown);
+        if !last.eq(ways.ways().iter().map(shown)) {
             self.draw_blocks(at);
         }
     }
@@ -387,7 +405,9 @@ impl Sender<'_> {
         }
         let none = BlockedWays::default();
         let scene = drawn::blocks(blocks.unwrap_or(&none), map, time(at));
-        self.writers.blocked.send(floor::markers(&scene, at, self.frames));
+        self.writers
+            .blocked
+            .send(floor::markers(&scene, at, self.frames));
     }
 
     fn route(&mut self, route: &Route, at: At) {
@@ -395,7 +415,9 @@ impl Sender<'_> {
             return;
         }
         if let Some(map) = &self.known.map {
-            self.writers.path.send(motion::path(route, map, at, self.frames));
+            self.writers
+                .path
+                .send(motion::path(route, map, at, self.frames));
         }
         self.known.route = Some(Box::new(*route));
     }
@@ -453,7 +475,9 @@ impl Sender<'_> {
         if let Some((truth, at)) = self.known.changed.take_if(|(truth, _)| may_be(truth)) {
             let at = (calendar, at);
             let scene: SceneUpdate = drawn::world(&truth, side, time(at));
-            self.writers.world.send(floor::markers(&scene, at, self.frames));
+            self.writers
+                .world
+                .send(floor::markers(&scene, at, self.frames));
             self.known.drawn = Some(truth);
             self.known.drawn_at = now;
         }
@@ -492,7 +516,9 @@ impl Sender<'_> {
             feeds.line.passed(&[line.counts(), line_state.counts()]),
             feeds.steering.passed(&[joints.counts(), battery.counts()]),
             feeds.health.passed(&[]),
-            feeds.status.passed(&[pose.counts(), odom.counts(), tf.counts()]),
+            feeds
+                .status
+                .passed(&[pose.counts(), odom.counts(), tf.counts()]),
             feeds.map.passed(&[floor.counts(), grid.counts()]),
             feeds.route.passed(&[path.counts()]),
             feeds.blocks.passed(&[blocked.counts()]),
@@ -508,4 +534,3 @@ fn time((calendar, at): At) -> Time {
 
 /// The part as which the gateway joins the bus.
 pub const ROLE: Role = Role::Gateway;
-

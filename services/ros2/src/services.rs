@@ -268,10 +268,17 @@ impl Services {
                 Err(error) => (true, no(format!("{MOVING}: {error}"))),
                 Ok(None) => {
                     again = true;
-                    (false, no(format!("{MOVING}: its stop word was removed again and again")))
+                    (
+                        false,
+                        no(format!(
+                            "{MOVING}: its stop word was removed again and again"
+                        )),
+                    )
                 }
                 Ok(Some(told)) => {
-                    let bridge = told.bridge().map(|process| (process, process_state(process)));
+                    let bridge = told
+                        .bridge()
+                        .map(|process| (process, process_state(process)));
                     match judge(told, stopping.ordered_ns, now_ns, bridge) {
                         Verdict::Stands(said) => (true, yes(said)),
                         Verdict::Never(why) => (true, no(format!("{MOVING}: {why}"))),
@@ -298,8 +305,7 @@ impl Services {
             let Some(server) = servers.get(&one.service) else {
                 return false;
             };
-            let is_due =
-                node.is_heard_by(server, &one.asker) || now - one.since >= MATCH;
+            let is_due = node.is_heard_by(server, &one.asker) || now - one.since >= MATCH;
             if is_due && server.answer(one.asker, one.answer.clone()).is_err() {
                 log::warn!("there was no room for an answer of {}", one.service.name());
             }
@@ -353,9 +359,11 @@ pub enum ServicesError {
 /// It is older than `latest`, or nobody can know how old it is.
 fn age(at_ns: Option<u64>, now_ns: u64, latest: Duration) -> Result<Duration, String> {
     let Some(at_ns) = at_ns else {
-        return Err("refused: the request does not say when it was sent, and an old one must not \
+        return Err(
+            "refused: the request does not say when it was sent, and an old one must not \
                     move the robot"
-            .to_owned());
+                .to_owned(),
+        );
     };
     let off = Duration::from_nanos(at_ns.abs_diff(now_ns));
     match at_ns > now_ns {
@@ -422,7 +430,9 @@ fn carry_out(lager: &[OsString], job: &Job) -> TriggerResponse {
 /// What a command has said, as one line.
 fn said(output: &[u8]) -> String {
     let text = String::from_utf8_lossy(output);
-    let lines = text.lines().map(|line| line.trim().trim_start_matches("lager: "));
+    let lines = text
+        .lines()
+        .map(|line| line.trim().trim_start_matches("lager: "));
     let lines = lines.filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join("; ")
 }
@@ -450,7 +460,10 @@ mod tests {
 
     #[test]
     fn what_a_command_says_is_the_answer() {
-        assert_eq!(said(b"it was stopped\n  released \n\n"), "it was stopped; released");
+        assert_eq!(
+            said(b"it was stopped\n  released \n\n"),
+            "it was stopped; released"
+        );
     }
 
     #[test]

@@ -27,7 +27,10 @@ impl Log for Voice {
     }
 
     fn log(&self, record: &Record<'_>) {
-        let place = (record.target().to_owned(), record.line().unwrap_or_default());
+        let place = (
+            record.target().to_owned(),
+            record.line().unwrap_or_default(),
+        );
         // Our own warnings are limited where they are made.
         let is_own = record.target().starts_with("lager");
         if !is_own && record.level() > self.level {
@@ -88,8 +91,8 @@ pub(crate) fn warn_of(place: Place, is_operator: bool) {
     if !cfg!(feature = "patched") {
         complain(
             "this program was built without the patch of services/ros2/build: ROS 2 sees no type \
-             hashes, a node is listed for 50 s after its end, and range LOCALHOST does not keep \
-             packets of the network out",
+             hashes, a node is listed for 50 s after its end, one that was frozen is not heard again, \
+             and range LOCALHOST does not keep packets of the network out",
         );
     }
     if std::env::var("ROS_STATIC_PEERS").is_ok_and(|peers| !peers.is_empty()) {

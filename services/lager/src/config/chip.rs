@@ -189,7 +189,12 @@ impl Part {
 pub fn program_near(name: &str, built: &str) -> Option<PathBuf> {
     let program = std::env::current_exe().unwrap_or_default();
     let current = std::env::current_dir().unwrap_or_default();
-    near(program.parent().unwrap_or(Path::new("/")), &current, &[built], name)
+    near(
+        program.parent().unwrap_or(Path::new("/")),
+        &current,
+        &[built],
+        name,
+    )
 }
 
 /// A file beside this program, or in one of these folders of a tree that this program or the
