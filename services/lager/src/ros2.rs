@@ -98,8 +98,10 @@ mod tests {
 
     #[test]
     fn an_operators_command_finds_the_same_robot_from_any_folder() {
-        let mut config = Config::default();
-        config.name = "r7".to_owned();
+        let mut config = Config {
+            name: "r7".to_owned(),
+            ..Config::default()
+        };
         config.bus.folder = Some("bus".into());
         let global = GlobalArgs {
             config: Some("-".into()),

@@ -33,6 +33,9 @@ use crate::place::{Place, Reach};
 
 /// How many messages may await a reliable reader's acknowledgement.
 pub const ROOM: i32 = 2_048;
+/// How many samples one look at the bus may bring, of which RustDDS sends each only if its history has
+/// room for all.
+const BURST: i32 = 1_024;
 /// How often the same topic is complained of.
 const COMPLAINT: Duration = Duration::from_secs(10);
 
@@ -74,7 +77,7 @@ pub enum Quality {
 impl Quality {
     fn policies(self) -> QosPolicies {
         let (reliability, durability, depth) = match self {
-            Self::SensorData => (Reliability::BestEffort, Durability::Volatile, 5),
+            Self::SensorData => (Reliability::BestEffort, Durability::Volatile, BURST),
             Self::Reliable(depth) => (RELIABLE, Durability::Volatile, depth),
             Self::Lasting(depth) => (RELIABLE, Durability::TransientLocal, depth),
         };
