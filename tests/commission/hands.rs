@@ -118,7 +118,12 @@ impl Hands {
             heading: Heading::Right.into(),
             ..WorldAsk::default()
         };
-        let answer = wait_for("the world", || self.world.call(ask, WATCHDOG / 100).ok());
+        // On a busy machine an emulator answers late. What may be done twice is done again.
+        let is_late = |outcome| outcome == Outcome::NoBoard && kind != WorldAskKind::Shift;
+        let answer = wait_for("the world", || {
+            let answer = self.world.call(ask, WATCHDOG / 100).ok();
+            answer.filter(|answer| !is_late(answer.outcome))
+        });
         assert_eq!(answer.outcome, Outcome::Done, "{kind:?}: {answer:?}");
     }
 

@@ -172,14 +172,15 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                     waiting: config.bus.policy(),
                     resume,
                 };
-                Ok(match config.body {
-                    Body::Serial => lager_bridge::run(bus, &bridge, &shutdown)?,
+                let ran = match config.body {
+                    Body::Serial => lager_bridge::run(bus, &bridge, &shutdown),
                     // The buttons of a simulated robot are in its world.
                     Body::Sim | Body::Chip => {
                         let lines = simulated_lines::World(bus);
-                        lager_bridge::run_with(bus, &bridge, &lines, &shutdown)?;
+                        lager_bridge::run_with(bus, &bridge, &lines, &shutdown)
                     }
-                })
+                };
+                Ok(ran?)
             })?;
             return Ok(ExitCode::SUCCESS);
         }

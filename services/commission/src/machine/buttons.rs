@@ -78,10 +78,10 @@ impl Commissioning {
                 }
             }
             (Some(Outcome::Done), Some(ButtonLines::Absent)) => self.without(now, "found_no_lines"),
-            (Some(Outcome::Done), _) => {
-                if work.since.is_some_and(|since| now.robot >= since + UNREAD) {
-                    self.without(now, "found_no_lines");
-                }
+            (Some(Outcome::Done), _)
+                if work.since.is_some_and(|since| now.robot >= since + UNREAD) =>
+            {
+                self.without(now, "found_no_lines");
             }
             // Somebody lets logic drive, and then the buttons must count.
             (Some(Outcome::UnderWay), _) => self.fall_back(now, "not_by_hand"),
