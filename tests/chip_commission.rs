@@ -14,7 +14,7 @@ use lager_plant::Build;
 use lager_ports::{Bus, BusConfig};
 use lager_tests::{Domain, Running, in_tree, wait_for};
 use lager_topics::{Role, TruthPose};
-use person::Person;
+use person::{Person, let_logic_drive};
 use rustix::process::Signal;
 
 const IMAGES: &str = "firmware/avr/target/images";
@@ -71,6 +71,7 @@ fn commission(seed: u64) {
     let mission = ["--mission", "1", "--exit-when-done", "--json"];
     let mut robot = up(&domain, &config, &mission);
     let bus = joined(&domain);
+    let_logic_drive(&bus, build.buttons);
     let mut truth = bus.subscriber::<TruthPose>().expect("a topic");
     let mut collisions = None;
     while robot.is_running() {

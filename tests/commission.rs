@@ -13,7 +13,7 @@ use lager_plant::{Build, ButtonsBuild, ContactBuild, Ranger};
 use lager_ports::{Bus, Client};
 use lager_tests::{Domain, Running, WATCHDOG, wait_for};
 use lager_topics::{LinkHealth, Role, WorldAsk, WorldAskKind, WorldRequest};
-use person::Person;
+use person::{Person, let_logic_drive};
 use rustix::process::Signal;
 
 /// A robot that differs in everything; its battery is not measured, and its shoulder has one servo.
@@ -114,6 +114,11 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
         "--exit-when-done",
         "--json",
     ]);
+    let bus = wait_for("the bus", || {
+        Bus::open(&domain.bus("r1", 1.0), Role::Operator).ok()
+    });
+    let_logic_drive(&bus, build.buttons);
+    drop(bus);
     assert_eq!(robot.wait(), Some(0), "{}\n{text}", robot.log());
     assert_eq!(robot.json()["delivered"], serde_json::json!([1]));
     its_mode_button_toggles_the_mode(&domain, &config);

@@ -272,6 +272,15 @@ impl Hands {
     }
 }
 
+/// Moves a mode switch to autonomous, which stands at manual in a new world. A robot without one lets
+/// logic drive by itself.
+pub(crate) fn let_logic_drive(bus: &Bus, buttons: ButtonsBuild) {
+    let is_switch = |(_, kind)| kind == SwitchKind::Position;
+    if buttons.mode.is_some_and(is_switch) {
+        Hands::new(bus, buttons).act(WorldAskKind::Press, 1, 1);
+    }
+}
+
 /// The distance at which something is held for this question.
 pub(crate) const fn cm(question: Question) -> u8 {
     match question {

@@ -15,6 +15,7 @@ use lager_ports::Bus;
 use lager_tests::{Domain, wait_for};
 use lager_topics::Truth;
 
+pub(crate) use hands::let_logic_drive;
 use hands::{DRIVE, GROWS, Hands, cm};
 
 /// A person with a terminal, who sees the robot and takes it into his hands.

@@ -7,15 +7,16 @@ use std::fs;
 
 use lager_commission::sentences;
 use lager_plant::{ArmBuild, Build, Ranger};
+use lager_ports::Bus;
 use lager_tests::{Domain, children, pid, wait_for};
-use lager_topics::LinkHealth;
+use lager_topics::{LinkHealth, Role};
 use rustix::process::{Signal, kill_process};
 use serde_json::json;
 
 use crate::keyboard::press;
 use crate::played::Stage;
 use crate::scene::Scene;
-use person::{Person, does, open};
+use person::{Person, does, let_logic_drive, open};
 
 /// A robot that differs in everything; its battery is not measured.
 fn other() -> (u64, Build) {
@@ -185,6 +186,11 @@ fn a_robot_that_nobody_described_is_set_up_by_clicks_and_delivers() {
         "--exit-when-done",
         "--json",
     ]);
+    let bus = wait_for("the bus", || {
+        Bus::open(&domain.bus("r1", 1.0), Role::Operator).ok()
+    });
+    let_logic_drive(&bus, other().1.buttons);
+    drop(bus);
     assert_eq!(robot.wait(), Some(0), "{}\n{saved}", robot.log());
     assert_eq!(robot.json()["delivered"], json!([1]));
     domain.assert_clean();

@@ -13,6 +13,7 @@ use lager_topics::Truth;
 
 use crate::browser::Page;
 use crate::scene::Scene;
+pub(super) use hands::let_logic_drive;
 use hands::{DRIVE, GROWS, Hands, cm};
 
 /// A person at the page, who takes the robot into his hands.
