@@ -12,7 +12,8 @@ use core::fmt;
 
 use serde::Serialize;
 
-use crate::report::{Row, Run};
+use crate::report::Row;
+use crate::rounds::Run;
 use crate::saved::{Saved, SavedRow};
 
 /// Why two measurements cannot be compared.
@@ -265,7 +266,8 @@ impl fmt::Display for Comparison {
 mod tests {
     use super::*;
     use crate::conditions::Machine;
-    use crate::report::{Mode, Rate, Regime};
+    use crate::report::{Mode, Regime};
+    use crate::rounds::Rate;
     use crate::stats::Distribution;
 
     /// A measurement with these rows: name, and the median of each run in us.

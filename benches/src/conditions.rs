@@ -6,7 +6,8 @@ use core::fmt;
 use lager_rig::schedule::usable_cores;
 use serde::{Deserialize, Serialize};
 
-use crate::machine::Cores;
+/// The cores of the two processes of a measurement.
+pub type Cores = (usize, usize);
 
 /// What decides about times of this machine. Two measurements can be compared if it is the same.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

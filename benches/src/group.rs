@@ -13,7 +13,8 @@ use lager_rig::{Watch, heed_interrupts, interrupted};
 
 use crate::error::BenchError;
 use crate::machine::kept_awake;
-use crate::report::{Mode, Options, Rate, Ratio, Regime, Row, Run, Spread};
+use crate::report::{Mode, Options, Ratio, Regime, Row};
+use crate::rounds::{Rate, Run, Spread, Taken};
 use crate::stats::{Distribution, median};
 
 /// From this time on a core was held up. A robot's leases and reports are as long, so it stands.
@@ -42,49 +43,6 @@ impl Entry {
             mode,
             against,
         }
-    }
-}
-
-/// The times of one round of a row, in ns; see [`crate::plan`] for the two kinds.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Taken {
-    /// From when each sample was sent.
-    pub service: Vec<u64>,
-    /// From when each was due; empty if the samples are sent as fast as they come back.
-    pub response: Vec<u64>,
-    /// Samples that came before they were sent, by the clock. They are in neither.
-    pub disordered: u64,
-    /// Samples a second: planned and sent. `None` if they are sent as fast as they come back.
-    pub rate: Option<Rate>,
-}
-
-impl Taken {
-    /// The times of samples that were due every `period` ns: when each was due, sent and received.
-    pub(crate) fn paced(period: u64, samples: impl IntoIterator<Item = [u64; 3]>) -> Self {
-        let mut taken = Self::default();
-        let (mut first, mut last, mut n) = (None, 0, 0_u32);
-        for [due, sent, received] in samples {
-            taken.add(Some(due), sent, received);
-            (last, n) = (sent, n + 1);
-            first = first.or(Some(sent));
-        }
-        let took = last.saturating_sub(first.unwrap_or(last));
-        taken.rate = (took > 0).then(|| Rate {
-            asked_hz: 1e9 / period as f64,
-            reached_hz: f64::from(n - 1) * 1e9 / took as f64,
-        });
-        taken
-    }
-
-    /// Adds a sample by the clock's readings.
-    pub(crate) fn add(&mut self, due: Option<u64>, sent: u64, received: u64) {
-        let Some(service) = received.checked_sub(sent) else {
-            self.disordered += 1;
-            return;
-        };
-        self.service.push(service);
-        self.response
-            .extend(due.map(|due| service + sent.saturating_sub(due)));
     }
 }
 
@@ -348,30 +306,6 @@ mod tests {
         let spread = rows[0].spread.unwrap();
         assert!(spread.p50_ns[0] == 120 && spread.p50_ns[1] >= 12_000);
         assert_eq!(rows[1].ratios, []);
-    }
-
-    #[test]
-    fn a_sample_that_came_before_it_was_sent_is_counted_and_in_no_percentile() {
-        let taken = Taken::paced(100, [[0, 0, 30], [100, 100, 90], [200, 250, 290]]);
-        assert_eq!((taken.service, taken.disordered), (vec![30, 40], 1));
-        assert_eq!(taken.response, [30, 90]);
-    }
-
-    #[test]
-    fn a_rate_that_was_not_reached_is_told_from_one_that_stumbled() {
-        let due = |number: u64| number * 1_000;
-        let reached = |sent: &dyn Fn(u64) -> u64| {
-            let samples = (0..1_000).map(|number| [due(number), sent(number), sent(number) + 10]);
-            Taken::paced(1_000, samples).rate.unwrap()
-        };
-        // Twice as long for each sample; and one stall, after which it has caught up.
-        let slow = reached(&|number| 2 * due(number));
-        let stumbled = reached(&|number| due(number) + if number == 500 { 900 } else { 0 });
-        assert!(
-            slow.overload() && !stumbled.overload(),
-            "{slow:?} {stumbled:?}"
-        );
-        assert!((slow.reached_hz - 500_000.0).abs() < 1.0, "{slow:?}");
     }
 
     #[test]

@@ -24,6 +24,7 @@ mod path;
 mod plan;
 mod publish;
 pub mod report;
+pub mod rounds;
 mod sample;
 pub mod saved;
 mod scenario;
@@ -33,10 +34,11 @@ pub mod steps;
 pub mod times;
 
 pub use error::BenchError;
-pub use group::{Entry, Group, Opened, Session, Taken};
+pub use group::{Entry, Group, Opened, Session};
 pub use lager_rig::{Domain, heed_interrupts, interrupted};
 pub use path::may_have_real_time;
-pub use report::{Mode, Options, Pace, Rate, Ratio, Regime, Report, Row, Run};
+pub use report::{Mode, Options, Pace, Ratio, Regime, Report, Row};
+pub use rounds::{Rate, Run, Taken};
 pub use scenario::Scenario;
 pub use stats::{Distribution, Quantiles, median};
 

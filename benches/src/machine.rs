@@ -7,11 +7,9 @@ use lager_rig::process::Main;
 use lager_rig::schedule::{pin, schedule, usable_cores};
 use lager_rig::{Parent, Process, Refused};
 
+use crate::conditions::Cores;
 use crate::error::BenchError;
 use crate::report::Regime;
-
-/// The cores of the two processes.
-pub type Cores = (usize, usize);
 
 const SPINNER: &str = "idle spinner";
 

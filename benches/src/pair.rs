@@ -23,9 +23,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::baseline::LIMIT;
 use crate::baseline::memory::Lanes;
+use crate::conditions::Cores;
 use crate::error::{BenchError, Fault, no_bus};
-use crate::group::{Entry, Opened, Session, Taken};
-use crate::machine::Cores;
+use crate::group::{Entry, Opened, Session};
+use crate::rounds::Taken;
 
 /// Rounds of each row in a run: with `--quick`, and without.
 pub(crate) const ROUNDS: [usize; 2] = [2, 4];

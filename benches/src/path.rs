@@ -36,10 +36,12 @@ mod turn;
 use lager_rig::Refused;
 use lager_rig::schedule::{Bound, NoRealTime, Placement, RealTime};
 
+use crate::conditions::Cores;
 use crate::error::BenchError;
-use crate::group::{Entry, Group, Session, Taken};
-use crate::machine::{Cores, cores_for};
+use crate::group::{Entry, Group, Session};
+use crate::machine::cores_for;
 use crate::report::{Mode, Options, Regime, Row};
+use crate::rounds::Taken;
 use crate::stats::Distribution;
 use floor::Floor;
 use robot::{Places, Robot};

@@ -65,7 +65,7 @@ pub(crate) struct Due {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::group::Taken;
+    use crate::rounds::Taken;
     use crate::stats::Distribution;
 
     const MS: u64 = 1_000_000;

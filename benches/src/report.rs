@@ -11,10 +11,9 @@ use clap::ValueEnum;
 use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
-use crate::conditions::Conditions;
-use crate::group::Taken;
-use crate::machine::Cores;
-use crate::stats::{Distribution, Quantiles, median};
+use crate::conditions::{Conditions, Cores};
+use crate::rounds::{Rate, Run, Spread};
+use crate::stats::Quantiles;
 
 /// How the receiver waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
@@ -158,100 +157,6 @@ pub struct Ratio {
     /// Both ratios of each run.
     #[serde(default)]
     pub runs: Vec<(f64, Option<f64>)>,
-}
-
-/// Samples a second.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rate {
-    /// That were due.
-    pub asked_hz: f64,
-    /// That were sent.
-    pub reached_hz: f64,
-}
-
-impl Rate {
-    /// The median of what the rounds reached: one stall at the end of a round is not yet a machine
-    /// that cannot do it.
-    pub(crate) fn over<'a>(rounds: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
-        let asked_hz = rounds.clone().next()?.asked_hz;
-        let reached_hz = median(rounds.map(|rate| rate.reached_hz).collect())?;
-        Some(Self {
-            asked_hz,
-            reached_hz,
-        })
-    }
-
-    /// Whether less than 99 % of what was asked was reached. Such times say how long the backlog
-    /// grew, and nothing about the software at that rate.
-    #[must_use]
-    pub fn overload(&self) -> bool {
-        self.reached_hz < 0.99 * self.asked_hz
-    }
-}
-
-/// The times of a row in one run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Run {
-    /// From when each sample was sent.
-    pub service: Distribution,
-    /// From when each was due; empty if the samples have no plan.
-    pub response: Distribution,
-    /// Samples that came before they were sent, by the clock.
-    #[serde(default)]
-    pub disordered: u64,
-    /// The rate of each round.
-    #[serde(default)]
-    pub rates: Vec<Rate>,
-    /// When it began, in seconds since the measurement's beginning.
-    #[serde(default)]
-    pub from_s: f64,
-    /// How long it took in seconds, with the turns of the other rows.
-    #[serde(default)]
-    pub took_s: f64,
-}
-
-impl Run {
-    /// Adds a round.
-    pub(crate) fn add(&mut self, taken: Taken) {
-        self.service.extend(taken.service);
-        self.response.extend(taken.response);
-        self.disordered += taken.disordered;
-        self.rates.extend(taken.rate);
-    }
-
-    /// What a person waits for who asks for the row's times: response times where there is a plan.
-    #[must_use]
-    pub fn times(&self) -> &Distribution {
-        match self.response.quantiles().n {
-            0 => &self.service,
-            _ => &self.response,
-        }
-    }
-}
-
-/// The lowest and the highest figure of the runs, in ns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Spread {
-    /// Of each run's p50.
-    pub p50_ns: [u64; 2],
-    /// Of each run's p99; `None` if no run has enough samples for it.
-    pub p99_ns: Option<[u64; 2]>,
-}
-
-impl Spread {
-    /// `None` for a single run, and if no run has enough samples.
-    pub(crate) fn over(runs: &[Run]) -> Option<Self> {
-        let ends = |percent| {
-            let of = |run: &Run| run.times().percentile(percent);
-            let figures = || runs.iter().filter_map(of);
-            Some([figures().min()?, figures().max()?])
-        };
-        (runs.len() > 1).then_some(())?;
-        Some(Self {
-            p50_ns: ends(50.0)?,
-            p99_ns: ends(99.0),
-        })
-    }
 }
 
 /// The figures of one carrier in one mode and regime.

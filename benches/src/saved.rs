@@ -12,7 +12,8 @@ use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 use serde::{Deserialize, Serialize};
 
 use crate::conditions::{Conditions, Machine};
-use crate::report::{Report, Row, Run};
+use crate::report::{Report, Row};
+use crate::rounds::Run;
 use crate::stats::Distribution;
 
 /// The number of this layout; a later one that reads differently has another.

@@ -11,8 +11,8 @@ use rustix::thread::{ClockId, clock_nanosleep_absolute};
 
 use super::processes::Processes;
 use crate::error::BenchError;
-use crate::group::Taken;
 use crate::plan::Plan;
+use crate::rounds::Taken;
 
 /// Time between frames, in ns.
 const PERIOD: u64 = 1_000_000;
