@@ -118,19 +118,33 @@ impl Hands {
             heading: Heading::Right.into(),
             ..WorldAsk::default()
         };
-        // On a busy machine an emulator answers late. What may be done twice is done again.
-        let is_late = |outcome| outcome == Outcome::NoBoard && kind != WorldAskKind::Shift;
+        // On a busy machine an emulator answers late, and what may be done twice is done again.
         let answer = wait_for("the world", || {
             let answer = self.world.call(ask, WATCHDOG / 100).ok();
-            answer.filter(|answer| !is_late(answer.outcome))
+            answer.filter(|answer| answer.outcome != Outcome::NoBoard)
         });
         assert_eq!(answer.outcome, Outcome::Done, "{kind:?}: {answer:?}");
     }
 
-    /// Puts it down so far to the left of where it stands, in mm.
-    fn shift(&mut self, left: i16) {
-        let x = u8::try_from(left + 128).expect("a small step");
-        self.act(WorldAskKind::Shift, x, 0);
+    /// Puts it down on the first crossing, and then so far to the left, in mm.
+    fn place_beside(&mut self, left: i16) {
+        loop {
+            self.place(0, 0);
+            if self.shift(left) {
+                return;
+            }
+        }
+    }
+
+    /// Puts it down so far to the left of where it stands, in mm. Returns whether it was done in time.
+    fn shift(&mut self, left: i16) -> bool {
+        let ask = WorldAsk {
+            kind: WorldAskKind::Shift.into(),
+            x: u8::try_from(left + 128).expect("a small step"),
+            ..WorldAsk::default()
+        };
+        let answer = self.world.call(ask, WATCHDOG / 100);
+        answer.is_ok_and(|answer| answer.outcome == Outcome::Done)
     }
 
     fn place(&mut self, x: u8, y: u8) {
@@ -141,8 +155,7 @@ impl Hands {
     pub(crate) fn sway(&mut self, mut is_asked: impl FnMut() -> bool) {
         for step in (0..).map(|step: i16| step % 24) {
             if step == 0 {
-                self.place(0, 0);
-                self.shift(-SWAY);
+                self.place_beside(-SWAY);
             }
             self.shift(if step < 12 { 10 } else { -10 });
             if is_asked() {
@@ -201,10 +214,11 @@ impl Hands {
         match question {
             Question::Finish | Question::ClawEmpty => self.act(WorldAskKind::Fill, 0, 0),
             Question::LineFloor | Question::LineTape => {
-                self.place(0, 0);
-                if question == Question::LineFloor {
-                    self.shift(100);
-                }
+                self.place_beside(if question == Question::LineFloor {
+                    100
+                } else {
+                    0
+                });
                 self.pause();
             }
             Question::RangeFar | Question::RangeNear => {
