@@ -19,9 +19,11 @@ const LAYOUT: &str = "@layout";
 const LONGEST: usize = 200;
 
 /// The liveliness tokens of all robots.
+#[cfg(feature = "zenoh")]
 pub(crate) const EVERY_ALIVE: &str = "lager/*/@alive";
 
 /// The robot whose liveliness token this is; `None` for any other key.
+#[cfg(feature = "zenoh")]
 pub(crate) fn alive_of(key: &str) -> Option<UnitName> {
     let name = key.strip_prefix("lager/")?.strip_suffix("/@alive")?;
     name.parse().ok()
@@ -77,6 +79,7 @@ impl Keys {
     }
 
     /// All of these, for rules of access.
+    #[cfg(feature = "zenoh")]
     pub(crate) fn all(&self) -> [String; 5] {
         [
             self.topics(),
