@@ -45,7 +45,7 @@ beyond it. Where samples are due at a rate, a time counts from when its sample w
 due, so a stall hurts every sample that it delays. A ratio compares with a baseline
 of the same run, and is the median over the runs; you can compare ratios of two
 machines, but not times. Measure on an otherwise idle machine, with no robot up. The
-exit code is 2 if there is no result. The hop through Zenoh, which needs many crates, is
+hop through Zenoh, which needs many crates, is
 measured beside the others only by
 `cargo run --release -p lager-benches --features zenoh --bin lager-bench -- hop`.",
     args_conflicts_with_subcommands = true,
@@ -146,8 +146,8 @@ enum Scenario {
     Link,
 }
 
-/// There is no result, or two measurements cannot be compared.
-const NO_RESULT: u8 = 2;
+/// Two measurements cannot be compared; 1 says that something is slower.
+const INCOMPARABLE: u8 = 2;
 
 fn main() -> ExitCode {
     lager_benches::run_if_asked();
@@ -161,18 +161,20 @@ fn main() -> ExitCode {
     }) = &args.compare
     {
         let limit = 1.0 + limit / 100.0;
-        return ended("compare", compare([a, b], limit, *across_machines, *json));
+        let compared = compare([a, b], limit, *across_machines, *json);
+        return ended("compare", compared, ExitCode::from(INCOMPARABLE));
     }
     if let Err(refused) = args.refuse_what_does_not_vary() {
         refused.exit();
     }
     let scenario = args.scenario().to_possible_value();
     let name = scenario.as_ref().map_or("", PossibleValue::get_name);
-    ended(name, run(&args).map(|report| (report, ExitCode::SUCCESS)))
+    let measured = run(&args).map(|report| (report, ExitCode::SUCCESS));
+    ended(name, measured, ExitCode::FAILURE)
 }
 
 /// Prints what was found, or why there is nothing.
-fn ended(name: &str, result: Result<(String, ExitCode)>) -> ExitCode {
+fn ended(name: &str, result: Result<(String, ExitCode)>, failure: ExitCode) -> ExitCode {
     match result {
         Ok((report, code)) => {
             // It is no error that the reader has gone, as after `| head`.
@@ -181,7 +183,7 @@ fn ended(name: &str, result: Result<(String, ExitCode)>) -> ExitCode {
         }
         Err(error) => {
             eprintln!("lager: `lager bench {name}` has no result: {error:#}");
-            ExitCode::from(NO_RESULT)
+            failure
         }
     }
 }
@@ -377,7 +379,8 @@ mod tests {
 
     #[test]
     fn slower_and_broken_have_exit_codes_of_their_own() {
-        let ended = |result| format!("{:?}", super::ended("compare", result));
+        let incomparable = ExitCode::from(INCOMPARABLE);
+        let ended = |result| format!("{:?}", super::ended("compare", result, incomparable));
         let judged = |fails: bool| {
             let code = ExitCode::from(u8::from(fails));
             ended(Ok((String::new(), code)))
@@ -389,7 +392,7 @@ mod tests {
             true,
         );
         let codes = [judged(false), judged(true), ended(unreadable)];
-        let expected = [0, 1, NO_RESULT].map(|code| format!("{:?}", ExitCode::from(code)));
+        let expected = [0, 1, INCOMPARABLE].map(|code| format!("{:?}", ExitCode::from(code)));
         assert_eq!(codes, expected);
     }
 
