@@ -45,8 +45,7 @@ beyond it. Where samples are due at a rate, a time counts from when its sample w
 due, so a stall hurts every sample that it delays. A ratio compares with a baseline
 of the same run, and is the median over the runs; you can compare ratios of two
 machines, but not times. Measure on an otherwise idle machine, with no robot up. The
-hop through Zenoh, which needs many crates, is
-measured beside the others only by
+hop through Zenoh, which needs many crates, is measured beside the others only by
 `cargo run --release -p lager-benches --features zenoh --bin lager-bench -- hop`.",
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true
