@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::stats::{Distribution, median};
 
-/// The times of one round of a row, in ns; see [`crate::plan`] for the two kinds.
+/// The times of one round of a row, in ns: from when each was sent, and from when it was due.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Taken {
     /// From when each sample was sent.

@@ -308,7 +308,7 @@ mod tests {
         let head = "# The robot's name: the middle part of every topic's name.\nname = \"r1\"\n";
         assert!(text.starts_with(head), "{text}");
         assert!(
-            text.contains("\n# reset = ...\n# Whether a press of reset"),
+            text.contains("\n# reset = ...\n# Where the pressed reset"),
             "{text}"
         );
         assert!(!text.contains("log = ..."), "{text}");
