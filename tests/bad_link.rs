@@ -227,10 +227,10 @@ fn after_a_black_out_states_come_soon_and_meanwhile_top_says_what_is_old() {
         std::thread::sleep(Duration::from_secs(5));
         assert_eq!(top.wait(), Some(0), "{}", top.log());
         let picture = top.json();
-        let age_ns = row(&picture, "link/health")["age_ns"]
-            .as_u64()
-            .expect("an age");
-        assert!(age_ns > 3_000_000_000, "{picture}");
+        for topic in ["link/health", "sensor/line"] {
+            let age_ns = row(&picture, topic)["age_ns"].as_u64().expect("an age");
+            assert!(age_ns > 3_000_000_000, "{topic}: {picture}");
+        }
         assert_eq!(picture["failing"][0]["service"], "gateway", "{picture}");
         let before = told(&state).len();
         network.comes_back();

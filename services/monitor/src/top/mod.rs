@@ -75,8 +75,14 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
             return self.watch(&mut model, &mut feed, &mut screen);
         };
         let end = Instant::now() + long;
+        let mut looked = Instant::now();
         while Instant::now() < end && !self.shutdown.is_requested() {
             feed.drain(&mut model)?;
+            if looked.elapsed() >= WINDOW {
+                looked = Instant::now();
+                // Writers that have come since then.
+                feed.look(&mut model)?;
+            }
             std::thread::sleep(POLL);
         }
         feed.look(&mut model)?;
