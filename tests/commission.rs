@@ -12,7 +12,9 @@ use lager_orders::{Level, Mode, SwitchKind};
 use lager_plant::{Build, ButtonsBuild, ContactBuild, Ranger};
 use lager_ports::{Bus, Client};
 use lager_tests::{Domain, Running, WATCHDOG, wait_for};
-use lager_topics::{LinkHealth, Role, WorldAsk, WorldAskKind, WorldRequest};
+use lager_topics::{
+    LinkHealth, LogThought, Role, ThoughtKind, WorldAsk, WorldAskKind, WorldRequest,
+};
 use person::{Person, let_logic_drive};
 use rustix::process::Signal;
 
@@ -74,9 +76,19 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
     let (domain, config) = unknown(built);
     let mut robot = up(&domain, &config);
     let bus = Bus::open(&domain.bus("r1", 1.0), Role::Operator).expect("the bus opens");
+    let log = domain.start(&["topic", "echo", "log/thought", "--json"]);
     let mut person = Person::new(&domain, &bus, &config, &build);
     person.commission();
-    drop((person, bus));
+    // The log names who has set it up.
+    wait_for("the thought", || {
+        let who = format!("\"seen\":{}", rustix::process::getuid().as_raw());
+        let output = log.output();
+        let mut lines = output.lines();
+        lines
+            .find(|line| line.contains("set_up_in_terminal") && line.contains(&who))
+            .map(drop)
+    });
+    drop((person, log, bus));
     robot.signal(Signal::INT);
     // Whether it had a mission that failed is of no interest.
     robot.wait().expect("it ends");
@@ -209,6 +221,48 @@ fn whoever_ends_it_early_leaves_the_file_and_the_boards_as_they_were() {
     let undone = domain.run(&["commission", "--undo", "--config", &config]);
     assert_eq!(undone.status.code(), Some(1), "there is nothing to undo");
     drop((health, bus));
+    robot.signal(Signal::INT);
+    // Whether it had a mission that failed is of no interest.
+    robot.wait().expect("it ends");
+    domain.assert_clean();
+}
+
+/// The sensor board keeps its thresholds, whoever dies: the next one takes them back.
+#[test]
+fn a_calibration_of_a_killed_commissioning_is_taken_back_by_the_next_or_by_an_undo() {
+    let (built, build) = other();
+    let (domain, config) = unknown(built);
+    let mut robot = up(&domain, &config);
+    let bus = Bus::open(&domain.bus("r1", 1.0), Role::Operator).expect("the bus opens");
+    let note = domain.folder().join("robot.toml.calibrated");
+    for is_undone in [true, false] {
+        let mut person = Person::new(&domain, &bus, &config, &build);
+        loop {
+            match person.asked() {
+                Question::RangeFar => break,
+                question => person.answer(question),
+            };
+        }
+        person.child.kill().expect("it runs");
+        person.child.wait().expect("it ends");
+        assert!(note.exists());
+        if is_undone {
+            let undone = domain.run(&["commission", "--undo", "--config", &config]);
+            let said = String::from_utf8_lossy(&undone.stdout).into_owned();
+            assert!(undone.status.success(), "{undone:?}");
+            assert!(said.contains("is as it was before"), "{said}");
+        } else {
+            let mut person = Person::new(&domain, &bus, &config, &build);
+            person.asked();
+            person.say("quit");
+            let _ = wait_for("its end", || person.child.try_wait().expect("a child"));
+            person.look();
+            let last = person.printed.last().map(String::as_str);
+            assert_eq!(last, Some("nothing is written"));
+        }
+        assert!(!note.exists(), "they are back");
+    }
+    drop(bus);
     robot.signal(Signal::INT);
     // Whether it had a mission that failed is of no interest.
     robot.wait().expect("it ends");

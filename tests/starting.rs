@@ -46,14 +46,18 @@ impl Scene {
         let up = self
             .domain
             .start(&[&["--config", &self.config][..], &args].concat());
-        let seen = wait_for("its boards", || {
+        (up, self.seen())
+    }
+
+    /// An observer of the robot, once its boards are ready.
+    fn seen(&self) -> Seen {
+        wait_for("its boards", || {
             let mut seen = Seen::new(self.domain.observe("r1", 1.0));
             let health = wait_for("its health", || seen.health.latest().expect("readable"));
             health.boards_are_ready().then_some(())?;
             drop(health);
             Some(seen)
-        });
-        (up, seen)
+        })
     }
 
     fn stop(&self) -> Option<Stop> {
@@ -85,6 +89,14 @@ impl Seen {
             truth: bus.subscriber().expect("a topic"),
             _bus: bus,
         }
+    }
+
+    /// What the boards are described as.
+    fn description(&mut self) -> u32 {
+        wait_for("a description", || {
+            let health = self.health.latest().expect("readable")?;
+            (health.description != 0).then_some(health.description)
+        })
     }
 
     /// Waits until logic is in this phase, and returns where it believes the robot to be.
@@ -243,6 +255,65 @@ fn real_boards_wait_for_a_warehouse_and_keep_it_and_their_orders_over_a_kill() {
         let truth = seen.truth.latest().expect("readable")?;
         (truth.left_duty > 0).then_some(())
     });
+    drop(seen);
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let Scene { domain, body, .. } = scene;
+    drop(body);
+    domain.assert_clean();
+}
+
+#[test]
+fn real_boards_start_again_with_the_description_that_is_saved_and_stand_until_they_are_released() {
+    let scene = Scene::new();
+    let restart = ["--config", &scene.config, "commission", "--restart"];
+    let refused = scene.domain.run(&restart);
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        !refused.status.success() && said.contains("which alone can start it again"),
+        "{said}"
+    );
+
+    let (mut up, mut seen) = scene.up();
+    seen.phase(Phase::WaitingForMap);
+    let told = Page::of(&up).save(&hall());
+    assert!(told.starts_with("answer 1 done saved_in "), "{told}");
+    seen.phase(Phase::WaitingForOrder);
+    scene.domain.done(&["resume"]);
+    scene.domain.done(&["mode", "autonomous"]);
+    // It is on its way when somebody has it started again.
+    scene.domain.done(&["queue", "add", "screws"]);
+    wait_for("the robot to drive", || {
+        let truth = seen.truth.latest().expect("readable")?;
+        (truth.left_duty > 0).then_some(())
+    });
+    let described = seen.description();
+    let file = scene.domain.bus_folder().join(".state/r1/robot.toml");
+    // A description that cannot be used changes nothing, but the robot stands.
+    fs::write(&file, "[wheels]\nduty = 0\n").expect("a file");
+    drop(seen);
+    let refused = scene.domain.start(&restart);
+    says(&up, "goes on with what it had");
+    drop(refused);
+    assert_eq!(
+        scene.stop().map(|stop| stop.is_of_fresh_start()),
+        Some(false)
+    );
+    scene.domain.done(&["resume"]);
+
+    fs::write(&file, "[wheels]\nfull_turn_ms = 9000\n").expect("a file");
+    scene.domain.done(&restart);
+    says(&up, "starts again with what was saved");
+    let mut seen = scene.seen();
+    assert_ne!(seen.description(), described);
+    assert_eq!(seen.phase(Phase::WaitingForOrder), hall().delivery);
+    assert!(scene.stop().is_some_and(|stop| !stop.is_of_fresh_start()));
+    // It has its order, and stands until somebody releases the stop.
+    wait_for("its order again", || {
+        scene.listed().contains("goods 42").then_some(())
+    });
+    scene.domain.done(&["mode", "autonomous"]);
+    seen.stays(Phase::WaitingForOrder);
     drop(seen);
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(0), "{}", up.log());

@@ -119,7 +119,7 @@ impl Person {
     }
 
     /// Answers what is asked, from what is seen. Returns whether it was the last question.
-    fn answer(&mut self, question: Question) -> bool {
+    pub(crate) fn answer(&mut self, question: Question) -> bool {
         let begun = self.hands.seen;
         self.hands.prepare(question, self.joint);
         match question {

@@ -9,6 +9,8 @@ pub enum Commission {
     Begin,
     /// `undo`: put back the description from before the last commissioning.
     Undo,
+    /// `restart`: start the robot again, so that all of it uses the description that is saved.
+    Restart,
     /// `here`: the person is there. A movement goes on only while somebody says so.
     Here,
     /// `stand`: a movement ends, and its step begins anew.

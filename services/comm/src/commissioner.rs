@@ -27,8 +27,8 @@ const WAITING: usize = 256;
 pub struct Commissioner {
     /// Its file.
     pub program: PathBuf,
-    /// The arguments for a commissioning; with `--undo` behind them, it puts the former description
-    /// back.
+    /// The arguments for a commissioning. With `--undo` behind them, it puts the former description
+    /// back; with `--restart`, it has the robot started again.
     pub arguments: Vec<OsString>,
 }
 
@@ -50,16 +50,17 @@ pub(crate) struct Process {
 }
 
 impl Process {
-    /// Starts it. Each of its lines rings.
+    /// Starts it, with another flag. Each of its lines rings.
     ///
     /// # Errors
     /// The system gives no process, pipe or thread.
-    pub(crate) fn start(wanted: &Commissioner, is_undo: bool, ringer: Ringer) -> io::Result<Self> {
+    pub(crate) fn start(
+        wanted: &Commissioner,
+        flag: Option<&str>,
+        ringer: Ringer,
+    ) -> io::Result<Self> {
         let mut command = Command::new(&wanted.program);
-        command.args(&wanted.arguments);
-        if is_undo {
-            command.arg("--undo");
-        }
+        command.args(&wanted.arguments).args(flag);
         let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

@@ -361,14 +361,15 @@ impl Shell {
         if let (Some(process), _) = (&mut self.commissions, said) {
             return process.tell(given_ns, said);
         }
-        let is_undo = match said {
-            Commission::Begin => false,
-            Commission::Undo => true,
+        let flag = match said {
+            Commission::Begin => None,
+            Commission::Undo => Some("--undo"),
+            Commission::Restart => Some("--restart"),
             // It has ended meanwhile.
             _ => return,
         };
         let started = match &self.commissioner {
-            Some(wanted) => commissioner::Process::start(wanted, is_undo, self.waiter.ringer()),
+            Some(wanted) => commissioner::Process::start(wanted, flag, self.waiter.ringer()),
             None => Err(std::io::ErrorKind::NotFound.into()),
         };
         match started {

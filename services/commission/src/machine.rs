@@ -195,6 +195,14 @@ impl Commissioning {
         }
     }
 
+    /// The line sensors still have thresholds of a calibration that nobody has saved, because an
+    /// earlier commissioning was killed.
+    #[must_use]
+    pub fn after_calibration(mut self) -> Self {
+        self.thresholds = Thresholds::New;
+        self
+    }
+
     /// The present step.
     pub const fn step(&self) -> Step {
         self.step

@@ -61,6 +61,11 @@ impl Said {
         Self::new("ended_undone_but", &[("path", &path.display())])
     }
 
+    /// The robot starts again, with what is saved.
+    pub fn restarted() -> Self {
+        "ended_restarted".into()
+    }
+
     /// Nothing is written.
     pub fn nothing() -> Self {
         "ended_nothing".into()

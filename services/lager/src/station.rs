@@ -22,9 +22,8 @@ use lager_supervisor::children::adopt;
 use lager_supervisor::console;
 use lager_supervisor::runtime_folder::{GAG, RuntimeFolder};
 use lager_supervisor::state_folder::StateFolder;
-use lager_supervisor::{Parent, Service, ServiceManager};
+use lager_supervisor::{Service, ServiceManager};
 use lager_wake::Shutdown;
-use rustix::process::{Signal, getppid, kill_process};
 
 use crate::cli::StationArgs;
 use crate::config::{Body, Config, StationSection};
@@ -51,7 +50,7 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
                     let panel = Panel::open(address, tokens, server.handle())?;
                     Ok(match config.body {
                         Body::Serial => panel,
-                        Body::Sim | Body::Chip => panel.with_world(world(config, parent)?),
+                        Body::Sim | Body::Chip => panel.with_world(world(config)?),
                     })
                 });
                 panel.inspect_err(|error| tracing::warn!("{error:#}")).ok()
@@ -109,17 +108,13 @@ pub fn saved(config: &Config) -> Result<Config> {
     Ok(config)
 }
 
-/// The simulated world of the robot that `up`, the parent, runs beside this station.
-fn world(config: &Config, parent: Parent) -> Result<World> {
+/// The simulated world of the robot that `up` runs beside this station.
+fn world(config: &Config) -> Result<World> {
     let robot = Name::new(config.name.clone())?;
     let config = config.clone();
     let renew = move || -> Result<()> {
         saved(&config)?;
-        let supervisor =
-            getppid().filter(|pid| pid.as_raw_nonzero().get().cast_unsigned() == parent.pid);
-        let supervisor = supervisor.context("the program that has started the robot has ended")?;
-        kill_process(supervisor, Signal::USR1)?;
-        Ok(())
+        RuntimeFolder::ask_to_start_again(&config.bus()?)
     };
     Ok(World::new(robot, move || {
         renew().map_err(|error| Reason::new(Code::FloorUnfit, &[&format!("{error:#}")]))

@@ -7,7 +7,7 @@ mod external;
 use std::path;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use lager_floor::ProductId;
 use lager_home::Clock;
 use lager_lines::Called;
@@ -19,7 +19,7 @@ use lager_supervisor::mission::Mission;
 use lager_supervisor::runtime_folder::RuntimeFolder;
 use lager_supervisor::signals::Signals;
 use lager_supervisor::state_folder::{self, StateFolder, WarehouseCopy};
-use lager_supervisor::{Plan, Robot, Service, Terminal, World};
+use lager_supervisor::{Plan, Renewed, Robot, Service, Terminal};
 use lager_topics::Role;
 
 use crate::cli::UpArgs;
@@ -35,6 +35,7 @@ use external::External;
 pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let signals = Signals::listen()?;
     apply(&mut config, args)?;
+    let undescribed = config.clone();
     config.describe()?;
     config.validate()?;
     // Tools find these again in whatever folder and environment they run.
@@ -96,7 +97,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     ];
     let told = [first_line(&config, args)?, external.told].into_iter();
     let told = told.chain(external.panel).chain(external.gateway);
-    let renewal = renewal(&config, &state, args, external.listener.is_some());
+    let renewal = (!args.exit_when_done).then(|| renewal(undescribed, &config, &state));
     let plan = Plan {
         config: text,
         bus: config.bus()?,
@@ -195,29 +196,33 @@ fn run_in_copy(config: &mut Config, state: &StateFolder) -> Result<Option<Wareho
     Ok(Some(copy))
 }
 
-/// Makes the world of the warehouse that the robot's own station has saved, for a simulated robot.
-/// One that ends with its mission stays in its world.
+/// Finds out with what the robot starts again: the description that is saved and, if it is
+/// simulated, the warehouse that its own station has saved. Real boards have learnt that already.
 fn renewal(
+    undescribed: Config,
     config: &Config,
     state: &StateFolder,
-    args: &UpArgs,
-    has_station: bool,
-) -> Option<Box<dyn Fn() -> Result<World>>> {
-    if config.body == Body::Serial || args.exit_when_done || !has_station {
-        return None;
-    }
+) -> Box<dyn Fn() -> Result<Renewed>> {
     let (config, state) = (config.clone(), state.clone());
-    Some(Box::new(move || {
-        let mut config = station::saved(&config)?;
+    Box::new(move || {
+        let mut config = config.described_anew(&undescribed)?;
+        let kept = config.station.warehouse.as_ref();
+        let has_another = config.body != Body::Serial && kept.is_some_and(|kept| kept.exists());
+        if has_another {
+            config = station::saved(&config)?;
+        }
         let warehouse = run_in_copy(&mut config, &state)?;
         // The copy's, whatever somebody saves at this moment.
-        let products = config.warehouse()?.products;
-        Ok(World {
+        let products = match has_another {
+            true => Some(config.warehouse()?.products),
+            false => None,
+        };
+        Ok(Renewed {
             config: toml::to_string(&config)?,
-            warehouse: warehouse.context("no warehouse is saved")?,
-            products: products.iter().map(|product| product.id).collect(),
+            warehouse,
+            products: products.map(|all| all.iter().map(|product| product.id).collect()),
         })
-    }))
+    })
 }
 
 /// Chooses the warehouse, and where its changes are kept. Returns what people should know of it.

@@ -8,7 +8,7 @@
 //!     +-- all ended, in order; what is left swept <-+ the bus is damaged
 //!         after a while, each time a longer one (`resets.rs`)
 //!     ^
-//!     +-- all ended, in order, and at once <-- a simulated robot gets another world
+//!     +-- all ended, in order, and at once <-- a person wants what is saved to be used
 //! ```
 //! A service that ends or falls silent is restarted alone, once the attendant has the state from
 //! which it goes on. The bus counts as damaged if that would not help: a process that hangs before
@@ -53,7 +53,7 @@ pub(crate) enum Event {
     Due(Service),
     /// The new start is prepared.
     Restored,
-    /// The robot gets another simulated world.
+    /// The robot starts again with what is saved.
     Renewed,
 }
 
@@ -356,7 +356,7 @@ impl Course {
         }
     }
 
-    /// Ends everything, and starts it in another world, in which nothing has happened yet.
+    /// Ends everything, and starts it again as if nothing had happened yet.
     fn renew(&mut self, now: Duration) -> Vec<Step> {
         self.joined = false;
         self.resets.renew();

@@ -40,6 +40,6 @@ mod terminal;
 
 pub use children::Parent;
 pub use manager::ServiceManager;
-pub use robot::{Plan, Robot, World};
+pub use robot::{Plan, Renewed, Robot};
 pub use service::Service;
 pub use terminal::Terminal;

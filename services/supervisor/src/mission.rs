@@ -129,8 +129,8 @@ impl Mission {
         }
     }
 
-    /// The robot is in another world, where nothing has begun. Gives the mission of before up.
-    pub fn leave_world(&mut self, why: &str) {
+    /// The robot starts again, and nothing has begun. Gives the mission of before up.
+    pub fn begin_again(&mut self, why: &str) {
         self.give_up(why);
         self.begun = false;
     }

@@ -70,7 +70,7 @@ impl Resets {
         core::mem::replace(&mut self.was_whole, true)
     }
 
-    /// The robot gets another world: no service goes on from what was before.
+    /// The robot starts again with what is saved: no service goes on from what was before.
     pub(crate) fn renew(&mut self) {
         self.have_been = true;
         self.whole_since = None;

@@ -55,8 +55,8 @@ pub struct Plan {
     pub eeprom: Option<PathBuf>,
     /// The copy of its warehouse's file, if it runs in one.
     pub warehouse: Option<WarehouseCopy>,
-    /// Makes the world of the warehouse that its own station has saved, if it is simulated.
-    pub renewal: Option<Box<dyn Fn() -> Result<World>>>,
+    /// Finds out with what it starts again when a person wants what is saved to be used.
+    pub renewal: Option<Box<dyn Fn() -> Result<Renewed>>>,
     /// The products that it has to fetch.
     pub mission: Mission,
     /// Its orders, and the file that keeps them for another `up`.
@@ -67,14 +67,14 @@ pub struct Plan {
     pub exit_when_done: bool,
 }
 
-/// Another world for a simulated robot.
-pub struct World {
+/// With what a robot starts again.
+pub struct Renewed {
     /// The configuration of the robot's processes, in TOML.
     pub config: String,
-    /// Its warehouse.
-    pub warehouse: WarehouseCopy,
-    /// The products that it has.
-    pub products: Vec<i32>,
+    /// The copy of its warehouse's file, if it runs in one.
+    pub warehouse: Option<WarehouseCopy>,
+    /// If its world is another one: the products that this has.
+    pub products: Option<Vec<i32>>,
 }
 
 /// A robot that is up.
@@ -92,8 +92,8 @@ pub struct Robot {
     terminal: Terminal,
     /// How long the body could have run while services waited for its clock.
     body: Option<ChanceClock>,
-    /// The products of a world that the robot gets now.
-    products: Option<Vec<i32>>,
+    /// With what the robot starts again now, because a person wants it.
+    renewed: Option<Renewed>,
     began: Instant,
     folder_looked: Instant,
     /// What others were told last of the services.
@@ -131,7 +131,7 @@ impl Robot {
             signals,
             terminal,
             body: None,
-            products: None,
+            renewed: None,
             began: now,
             folder_looked: now,
             told: Vec::new(),
@@ -277,26 +277,32 @@ impl Robot {
         }
     }
 
-    /// Stops the robot and, if it is simulated, puts it on the delivery node of the warehouse that
-    /// its station has saved. Either way it stands until a person releases this stop: one who has
-    /// released an earlier stop did not know of the new world.
+    /// Stops the robot, and starts it again with what is saved: its description and, if it is
+    /// simulated, the warehouse of its own station, on whose delivery node it is put. Either way it
+    /// stands until a person releases this stop: one who has released an earlier stop did not know of
+    /// the new start.
     fn renew(&mut self) -> Result<()> {
-        let world = self.lock.stop().and_then(|()| match &self.plan.renewal {
+        let renewed = self.lock.stop().and_then(|()| match &self.plan.renewal {
             Some(renewal) => renewal(),
-            None => bail!("only a simulated robot with its own station can leave it, and none that ends with its mission"),
+            None => bail!("it ends with its mission"),
         });
-        let world = match world {
-            Ok(world) => world,
+        let renewed = match renewed {
+            Ok(renewed) => renewed,
             Err(error) => {
-                self.note(&format!("the robot stays in its warehouse: {error:#}"));
+                self.note(&format!(
+                    "the robot is stopped, and goes on with what it had: {error:#}"
+                ));
                 return Ok(());
             }
         };
-        self.note("the robot is stopped and put on the delivery node of the warehouse that was saved; `lager resume` lets it move");
-        self.children.configure(world.config.clone());
-        self.plan.config = world.config;
-        self.plan.warehouse = Some(world.warehouse);
-        self.products = Some(world.products);
+        self.note(match renewed.products {
+            Some(_) => "the robot is stopped and put on the delivery node of the warehouse that was saved; `lager resume` lets it move",
+            None => "the robot is stopped and starts again with what was saved; `lager resume` lets it move",
+        });
+        self.children.configure(renewed.config.clone());
+        self.plan.config.clone_from(&renewed.config);
+        self.plan.warehouse.clone_from(&renewed.warehouse);
+        self.renewed = Some(renewed);
         self.happened(Event::Renewed)
     }
 
@@ -351,7 +357,7 @@ impl Robot {
             .restore(bus, config, eeprom.as_deref())
             .and_then(|()| warehouse.as_ref().map(WarehouseCopy::write).transpose())
             // Somebody may have released the stop before the last service ended.
-            .and_then(|_| self.products.as_ref().map(|_| self.lock.hold()).transpose());
+            .and_then(|_| self.renewed.as_ref().map(|_| self.lock.hold()).transpose());
         if let Err(error) = restored {
             if matches!(error.downcast_ref(), Some(LockError::Up { .. })) {
                 return Err(error);
@@ -361,10 +367,11 @@ impl Robot {
         self.told.clear();
         // Nobody knows the robot's orders any more, and a simulated world is a new one.
         keeping.begin_again();
-        let products = self.products.take();
-        if products.is_some() {
-            mission.leave_world("the robot was put into another warehouse in the middle of it");
+        let renewed = self.renewed.take();
+        if renewed.is_some() {
+            mission.begin_again("the robot was started again in the middle of it");
         }
+        let products = renewed.and_then(|renewed| renewed.products);
         let dropped = products.map(|products| keeping.keep_only(&products));
         for product in dropped.unwrap_or_default() {
             self.note(&format!(

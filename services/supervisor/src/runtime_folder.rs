@@ -5,7 +5,7 @@
 
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
-use std::os::unix::fs::OpenOptionsExt as _;
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -14,6 +14,7 @@ use lager_lines::secret::Secret;
 use lager_ports::BusConfig;
 use lager_stop::{StopPage, StopWord};
 use lager_topics::{LAGER, Role, StopCause};
+use rustix::process::{Pid, Signal, kill_process};
 
 use crate::service::Service;
 
@@ -62,6 +63,37 @@ impl RuntimeFolder {
     pub fn running(bus: &BusConfig) -> Result<Option<PathBuf>> {
         let file = file(bus, CONFIG)?;
         Ok(file.is_file().then_some(file))
+    }
+
+    /// Asks the `up` of the robot of `bus` to stop it and to start it again with what is saved now.
+    /// Returns at once.
+    ///
+    /// # Errors
+    /// No `up` runs the robot, or it is another user's.
+    pub fn ask_to_start_again(bus: &BusConfig) -> Result<()> {
+        let mut up = bus.home()?.up();
+        let holders = up.remove(&bus.unit).unwrap_or_default();
+        let supervisor = holders.iter().find(|holder| holder.what == "up");
+        let supervisor = supervisor
+            .and_then(|holder| Pid::from_raw(holder.pid.cast_signed()))
+            .with_context(|| {
+                format!(
+                    "the robot `{}` was not started by `lager up`, which alone can start it again",
+                    bus.unit
+                )
+            })?;
+        kill_process(supervisor, Signal::USR1)
+            .with_context(|| format!("process {supervisor}, which runs the robot, cannot be asked"))
+    }
+
+    /// Another one each time the robot of `bus` starts again as a whole; `None` if none was started
+    /// here.
+    ///
+    /// # Errors
+    /// The folder of the bus cannot be found.
+    pub fn start_of(bus: &BusConfig) -> Result<Option<impl PartialEq + use<>>> {
+        let written = fs::metadata(file(bus, CONFIG)?).ok();
+        Ok(written.map(|file| (file.ino(), file.mtime(), file.mtime_nsec())))
     }
 
     /// Begins to give signs of life as this service of the robot of `bus`.

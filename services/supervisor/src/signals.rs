@@ -105,7 +105,7 @@ impl Press {
     }
 }
 
-/// The requests to end, and those for another world.
+/// The requests to end, and those to start again.
 pub struct Signals {
     wakes: UnixStream,
     interrupted: Arc<AtomicBool>,
@@ -149,8 +149,8 @@ impl Signals {
         self.asked
     }
 
-    /// Whether the robot's own station has asked for the world that it has saved (SIGUSR1), since
-    /// the last call.
+    /// Whether somebody has asked since the last call that the robot starts again with what is saved
+    /// (SIGUSR1).
     pub fn renewal_asked(&mut self) -> bool {
         let mut some = [0; 64];
         let mut is_asked = false;
@@ -160,7 +160,7 @@ impl Signals {
         is_asked
     }
 
-    /// What becomes readable when the robot's own station asks for another world.
+    /// What becomes readable when somebody asks for that.
     pub fn renewal(&self) -> BorrowedFd<'_> {
         self.renews.as_fd()
     }

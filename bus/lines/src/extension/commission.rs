@@ -159,6 +159,7 @@ pub(super) fn read(reader: &mut Reader<'_>) -> Result<Commission, Misread> {
     Ok(match word.text {
         "begin" => Commission::Begin,
         "undo" => Commission::Undo,
+        "restart" => Commission::Restart,
         "here" => Commission::Here,
         "stand" => Commission::Stand,
         "quit" => Commission::Quit,
@@ -169,7 +170,7 @@ pub(super) fn read(reader: &mut Reader<'_>) -> Result<Commission, Misread> {
                 AnswerWord::new,
             )?,
         },
-        _ => return Err(word.misread("one of begin, undo, here, stand, quit and answer")),
+        _ => return Err(word.misread("one of begin, undo, restart, here, stand, quit and answer")),
     })
 }
 
@@ -177,6 +178,7 @@ pub(super) fn put(said: Commission, formatter: &mut fmt::Formatter<'_>) -> fmt::
     formatter.write_str(match said {
         Commission::Begin => "begin",
         Commission::Undo => "undo",
+        Commission::Restart => "restart",
         Commission::Here => "here",
         Commission::Stand => "stand",
         Commission::Quit => "quit",

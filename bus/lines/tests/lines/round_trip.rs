@@ -141,6 +141,7 @@ fn commission() -> impl Strategy<Value = Commission> {
     let plain = [
         Commission::Begin,
         Commission::Undo,
+        Commission::Restart,
         Commission::Here,
         Commission::Stand,
         Commission::Quit,

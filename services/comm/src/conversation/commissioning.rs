@@ -22,10 +22,10 @@ impl Conversation {
     ) -> Result<(), Reason> {
         let known = &mut self.known.commission;
         match said {
-            Commission::Begin | Commission::Undo if known.is_at_work => {
+            Commission::Begin | Commission::Undo | Commission::Restart if known.is_at_work => {
                 return Err(Code::TooMuchAsked.into());
             }
-            Commission::Begin | Commission::Undo => {
+            Commission::Begin | Commission::Undo | Commission::Restart => {
                 *known = Commissioned {
                     is_at_work: true,
                     ..Commissioned::default()

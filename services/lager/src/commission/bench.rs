@@ -2,7 +2,8 @@
 //!
 //! However it ends, the robot stands, because nobody renews its order, and the boards are told what
 //! they were told before, unless the person has saved something else. If this process is killed or
-//! hangs, nobody renews the trial either, and the bridge takes it back after [`Ask::TRIAL`].
+//! hangs, nobody renews the trial either, and the bridge takes it back after [`Ask::TRIAL`]. What
+//! the sensor board has calibrated by then, the next commissioning takes back ([`OpenCalibration`]).
 
 use std::time::{Duration, Instant};
 
@@ -18,6 +19,7 @@ use lager_topics::{
 };
 use lager_wire::RobotProfile;
 
+use super::open::OpenCalibration;
 use crate::config::Config;
 use crate::diagnose;
 
@@ -43,6 +45,7 @@ pub struct Bench {
     trials: [Option<(Part, RobotProfile)>; Part::ALL.len()],
     renewed: Duration,
     configured: Config,
+    calibration: OpenCalibration,
     /// When it looked whether the robot is up.
     looked: Instant,
 }
@@ -52,7 +55,13 @@ impl Bench {
     ///
     /// # Errors
     /// The ports cannot be opened.
-    pub fn new(configured: &Config, bus: Bus, built: Built) -> Result<Self> {
+    pub fn new(
+        configured: &Config,
+        bus: Bus,
+        built: Built,
+        calibration: OpenCalibration,
+    ) -> Result<Self> {
+        let machine = Commissioning::new(built);
         Ok(Self {
             hands: Hands::new(&bus)?,
             health: bus.subscriber()?,
@@ -61,11 +70,15 @@ impl Bench {
             thoughts: bus.publisher()?,
             state: bus.subscriber()?,
             bus,
-            machine: Commissioning::new(built),
+            machine: match calibration.is_there() {
+                true => machine.after_calibration(),
+                false => machine,
+            },
             kept: None,
             trials: [None; Part::ALL.len()],
             renewed: Duration::ZERO,
             configured: configured.clone(),
+            calibration,
             looked: Instant::now(),
         })
     }
@@ -160,12 +173,17 @@ impl Bench {
                 Effect::Uncalibrate => {
                     let outcome = outcome(self.hands.ask(uncalibrate()));
                     self.machine.uncalibrated(self.now(), outcome);
+                    if !self.machine.has_calibrated() {
+                        warn(self.calibration.end());
+                    }
                 }
                 Effect::Listen => {
                     let answer = self.hands.ask(Ask::listen()).ok();
                     self.machine.lines(self.now(), answer.as_ref());
                 }
                 Effect::Calibrate => {
+                    // Before it begins: this process may be killed at any moment.
+                    warn(self.calibration.begin());
                     let outcome = outcome(self.hands.ask(Ask {
                         kind: AskKind::Calibrate.into(),
                         ..Ask::default()
@@ -230,6 +248,13 @@ pub fn uncalibrate() -> Ask {
     Ask {
         kind: AskKind::Uncalibrate.into(),
         ..Ask::default()
+    }
+}
+
+/// It goes on without the note.
+fn warn(noted: Result<()>) {
+    if let Err(error) = noted {
+        tracing::warn!("if this process is killed, the calibration stays: {error:#}");
     }
 }
 

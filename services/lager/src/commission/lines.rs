@@ -34,6 +34,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use super::Robot;
 use super::bench::Bench;
+use crate::cli::CommissionArgs;
 use crate::config::Config;
 use crate::time_limit::TimeLimit;
 
@@ -51,9 +52,12 @@ const HERE: Duration = Duration::from_secs(10);
 /// Without `here` for this long, nobody comes back, and others may begin.
 const ABANDONED: Duration = Duration::from_secs(600);
 
-/// Runs it, or puts the former description back. How it ends is told in any case.
-pub fn run(configured: &Config, is_undo: bool, shutdown: &Shutdown) -> Result<ExitCode> {
-    let ended = commission(configured, is_undo, shutdown);
+/// Does what `args` want. How it ends is told in any case.
+pub fn run(configured: &Config, args: &CommissionArgs, shutdown: &Shutdown) -> Result<ExitCode> {
+    let ended = match args.restart {
+        true => super::restart(configured, shutdown),
+        false => commission(configured, args.undo, shutdown),
+    };
     let said = ended.unwrap_or_else(|error| Said::failed(&format!("{error:#}")));
     tell(&Report::Commission(Box::new(Commissioning {
         ended: Some(said.reason()),
@@ -230,8 +234,11 @@ impl Page {
                     Ok(_) => {}
                 }
             }
-            Commission::Here | Commission::Answer { .. } | Commission::Begin | Commission::Undo => {
-            }
+            Commission::Here
+            | Commission::Answer { .. }
+            | Commission::Begin
+            | Commission::Undo
+            | Commission::Restart => {}
         }
         false
     }

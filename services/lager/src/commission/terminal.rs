@@ -215,9 +215,9 @@ pub fn hint(said: &Said) -> Option<&'static str> {
         "stop_in_force" => "lager resume",
         "board_misfit" | "original_board" => "lager board update",
         "not_both_boards" | "undescribed" => "lager doctor",
-        // A robot that systemd has started is started again by it.
-        "ended_kept" => "sudo systemctl restart lager`; to take it back, `lager commission --undo",
-        "ended_undone" => "sudo systemctl restart lager",
+        "ended_kept" => "lager commission --restart`; to take it back, `lager commission --undo",
+        "ended_undone" | "ended_undone_but" => "lager commission --restart",
+        "ended_restarted" => "lager resume",
         _ => return None,
     })
 }

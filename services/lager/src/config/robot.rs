@@ -173,6 +173,14 @@ impl Config {
         Ok((path, has_calibrated))
     }
 
+    /// Whether there is a description to which [`Config::forget_description`] goes back.
+    ///
+    /// # Errors
+    /// The robot has no place for a description.
+    pub fn has_former_description(&self) -> Result<bool> {
+        Ok(before_of(&self.place_of_description()?).exists())
+    }
+
     /// The line sensors have the thresholds again from before the last [`Config::keep_description`].
     ///
     /// # Errors
@@ -207,6 +215,27 @@ impl Config {
         }
         leave!(wheels, line, distance, battery, arm, logic, buttons);
         Ok(bare)
+    }
+
+    /// The same with the description as it is saved now. `undescribed` is the configuration from
+    /// before one was read.
+    ///
+    /// # Errors
+    /// The file cannot be read, or describes no robot.
+    pub fn described_anew(&self, undescribed: &Self) -> Result<Self> {
+        let mut described = Self {
+            robot: self.robot.clone(),
+            ..undescribed.clone()
+        };
+        described.describe()?;
+        let mut anew = self.clone();
+        macro_rules! put {
+            ($($section:ident),*) => { $(anew.$section = described.$section;)* };
+        }
+        put!(wheels, line, distance, battery, arm, logic, buttons);
+        anew.robot = described.robot;
+        anew.validate()?;
+        Ok(anew)
     }
 
     /// Where the description of this robot is, or would be.

@@ -6,7 +6,7 @@ mod person;
 
 use std::time::Duration;
 
-use lager_commission::{Answer, Built, Joint, Question, Step};
+use lager_commission::{Answer, Built, Commissioning, Joint, Question, Step};
 use lager_orders::Mode;
 use lager_plant::Build;
 use lager_simulator::Wire;
@@ -163,7 +163,8 @@ fn thresholds(person: &Person) -> [Vec<u8>; 2] {
 
 #[test]
 fn whoever_quits_or_goes_back_has_the_former_thresholds_of_the_line_sensors_again() {
-    for goes_back in [false, true] {
+    for how in ["quits", "goes back", "comes after one that was killed"] {
+        let goes_back = how == "goes back";
         let mut person = Person::new(&Config::default(), Build::default(), 1);
         person.until(Question::RangeFar);
         person.wait(Duration::from_secs(1));
@@ -172,6 +173,10 @@ fn whoever_quits_or_goes_back_has_the_former_thresholds_of_the_line_sensors_agai
         if goes_back {
             person.say(Answer::Back);
         } else {
+            if how != "quits" {
+                let built = person.machine().built();
+                *person.machine() = Commissioning::new(built).after_calibration();
+            }
             let now = person.whole.moment();
             person.machine().quit(now);
         }

@@ -122,7 +122,7 @@ export class Commission {
   /**
    * Takes the wheel if nobody has it, and begins.
    *
-   * @param {"begin" | "undo"} what
+   * @param {"begin" | "undo" | "restart"} what
    */
   async begin(what) {
     if (await this.take()) await this.send(what);
@@ -183,7 +183,7 @@ export class Commission {
     if (this.refused.at !== (how.asked ?? "")) this.refused = { said: "", at: how.asked ?? "" };
     const other = robot?.driver && !isMine ? reason(`ask_driver ${robot.driver}`) : "";
     put(this.said, sentences(this.refused.said || (isAtWork || !ended ? other : "")));
-    this.drawWays(robot, isAtWork, Boolean(ended));
+    this.drawWays(robot, isAtWork, ended ?? "");
     for (const one of this.ways.querySelectorAll(".on")) one.toggleAttribute("disabled", how.asked === undefined);
   }
 
@@ -223,13 +223,13 @@ export class Commission {
    *
    * @param {Robot | null} robot
    * @param {boolean} isAtWork
-   * @param {boolean} hasEnded
+   * @param {string} ended
    */
-  drawWays(robot, isAtWork, hasEnded) {
+  drawWays(robot, isAtWork, ended) {
     const { isMine, link } = this;
     const isManual = robot?.state.mode === "manual";
     const isFirst = robot?.commission?.step === "boards";
-    const can = [isAtWork, isMine, link.mayDrive, this.isLeaving, isAtWork && isFirst && !isManual, hasEnded, robot?.kept.length, current(), robot?.name].join(" ");
+    const can = [isAtWork, isMine, link.mayDrive, this.isLeaving, isAtWork && isFirst && !isManual, ended, robot?.kept.length, current(), robot?.name].join(" ");
     if (this.can === can) return;
     this.can = can;
     const hadFocus = this.ways.contains(document.activeElement);
@@ -247,8 +247,9 @@ export class Commission {
       for (const on of ["back", "again", "skip"]) add(on, () => this.answer(on), "on");
       add("quit", () => this.leave(true), "plain");
     } else {
-      if (hasEnded && robot?.kept.length) add("save", () => this.save(), "first save");
-      add("begin", () => this.begin("begin"), hasEnded ? "" : "first");
+      if (/^ended_(kept|undone)/.test(ended)) add("restart", () => this.begin("restart"), "first");
+      if (ended && robot?.kept.length) add("save", () => this.save(), "save");
+      add("begin", () => this.begin("begin"), ended ? "" : "first");
       add("undo", () => this.begin("undo"), "plain");
     }
     // Whoever looks on may take the description with him.

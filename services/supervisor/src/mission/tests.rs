@@ -94,7 +94,7 @@ fn a_person_who_has_set_the_mode_before_the_mission_began_keeps_it() {
 fn in_another_world_the_robot_begins_anew_and_the_mission_of_before_is_given_up() {
     let mut mission = Mission::of_robot(&[3], 1);
     mission.begun = true;
-    mission.leave_world("it is in another warehouse");
+    mission.begin_again("it starts again");
     let mut watch = simulated(mission);
     let mut ready = seen(Phase::WaitingForOrder, delivered(0, 0));
     ready.health.as_mut().expect("health").mode_chosen = 0;

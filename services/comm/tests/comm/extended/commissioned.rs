@@ -49,18 +49,22 @@ fn an_answer_counts_only_for_what_is_asked() {
             "undo",
             "refused 5 there are too many requests at a time; try again",
         ),
+        (
+            "restart",
+            "refused 6 there are too many requests at a time; try again",
+        ),
     ] {
         let number = answer.split(' ').nth(1).expect("a number");
         let said = robot.hears(&[&format!("do {number} commission {words}")]);
         assert_eq!(said, [answer]);
     }
-    let said = robot.hears(&["do 6 commission answer 3 yes"]);
-    assert_eq!(said, ["[commission answer 3 yes]", "done 6"]);
+    let said = robot.hears(&["do 7 commission answer 3 yes"]);
+    assert_eq!(said, ["[commission answer 3 yes]", "done 7"]);
     // While something must happen first, nothing is an answer.
     tells(&mut robot, "commission step=turn");
     assert_eq!(
-        robot.hears(&["do 7 commission answer 3 yes"]),
-        ["refused 7 the robot asks for it again"]
+        robot.hears(&["do 8 commission answer 3 yes"]),
+        ["refused 8 the robot asks for it again"]
     );
 }
 
@@ -78,8 +82,13 @@ fn where_none_is_at_work_nothing_but_a_beginning_is_taken() {
     );
     robot.conversation.commission_over(None);
     assert_eq!(
-        robot.hears(&["do 10 commission begin"]),
-        ["[commission begin]", "done 10"]
+        robot.hears(&["do 10 commission restart"]),
+        ["[commission restart]", "done 10"]
+    );
+    robot.conversation.commission_over(None);
+    assert_eq!(
+        robot.hears(&["do 11 commission begin"]),
+        ["[commission begin]", "done 11"]
     );
 }
 
