@@ -26,9 +26,9 @@
 //! # }
 //! ```
 //!
-//! Other programs can define payloads and topics of their own: `examples/` has one program that
-//! publishes, one that acts and one that observes. A process that creates a topic also states the
-//! layout of its samples, so [`Bus::found`] reads a topic with which this process was not built.
+//! Other programs can define payloads and topics of their own: `examples/` has programs that publish,
+//! act, observe and watch. A process that creates a topic also states the layout of its samples, so
+//! [`Bus::found`] reads a topic with which this process was not built.
 //!
 //! * Queues overwrite. A subscriber that falls behind loses the oldest samples and never blocks the
 //!   publisher; [`Subscriber::lost`] says exactly how many samples it missed.

@@ -1,7 +1,7 @@
 //! Observers that ask to be woken: any number of them, and none that holds another one up.
 
-use std::sync::Barrier;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Barrier, Mutex};
 use std::time::{Duration, Instant};
 
 use lager_ports::{Bus, Cause, Watcher};
@@ -55,13 +55,17 @@ fn crowd(watchers: usize, burst: u64) {
     let domain = Domain::new();
     let (writing, observing) = (domain.open(Role::Operator), domain.open(Role::Observer));
     let publisher = writing.publisher::<Crowded>().unwrap();
-    let joined = Barrier::new(watchers + 1);
-    let (rung, all) = (AtomicUsize::new(0), AtomicU64::new(u64::MAX));
+    // One joins after the other, as people start programs.
+    let joining = Mutex::new(());
+    let [joined, rung] = [const { AtomicUsize::new(0) }; 2];
+    let all = AtomicU64::new(u64::MAX);
     let watch = || {
+        let turn = joining.lock();
         let mut subscriber = observing.subscriber::<Crowded>().unwrap();
         let mut watcher = observing.watcher().unwrap();
         subscriber.wakes(&mut watcher);
-        joined.wait();
+        drop(turn);
+        joined.fetch_add(1, Ordering::AcqRel);
         let mut missing = RINGS;
         while subscriber.received() + subscriber.lost() < all.load(Ordering::Acquire) {
             watcher.wait(SHORT);
@@ -81,7 +85,13 @@ fn crowd(watchers: usize, burst: u64) {
             scope.spawn(watch);
         }
         let _ends = EndsAll(&all);
-        joined.wait();
+        let mut seen = 0;
+        while joined.load(Ordering::Acquire) < watchers {
+            until("another watcher has joined", || {
+                let before = std::mem::replace(&mut seen, joined.load(Ordering::Acquire));
+                seen > before || seen == watchers
+            });
+        }
         let next = || publisher.send(Cause::OWN, LineFrame::default()).unwrap();
         until("each watcher was rung", || {
             next();
