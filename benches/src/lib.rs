@@ -32,6 +32,7 @@ pub mod slow;
 pub mod stats;
 pub mod steps;
 pub mod times;
+mod watch;
 
 pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session};
@@ -52,6 +53,7 @@ pub fn run_if_asked() {
         machine::PROCESSES,
         hop::PROCESSES,
         publish::PROCESSES,
+        watch::PROCESSES,
         path::PROCESSES,
         path::FLOOR_PROCESSES,
     ]);

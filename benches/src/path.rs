@@ -16,10 +16,13 @@
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
 //! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
 //! | `path@remote` | `lager/8 listeners` | `lager/alone`; all SCHED_FIFO; only with the feature `zenoh` |
+//! | `path@watched` | `lager/8 watchers`, `lager/64 watchers` | `lager/alone`; all SCHED_FIFO |
 //! | `path-overtaken` | frames of each `lager` row whose command was overtaken | |
 //!
 //! An observer is a process on an iceoryx2 node of its own. It subscribes to `sensor/line` and
 //! `steering/command`, and ten times a second it reads all that has come.
+//!
+//! A watcher is the same, but every sample wakes it (`lager bench fanout`).
 //!
 //! A listener is a process that gets every sample of every topic over Zenoh, from a gateway of the
 //! robot in a process of its own, as from a network.
@@ -67,6 +70,8 @@ enum Beside {
     Nobody,
     /// So many observers on the bus.
     Observers(usize),
+    /// So many observers that every sample wakes.
+    Watchers(usize),
     /// A gateway, and so many listeners of it.
     #[cfg(feature = "zenoh")]
     Listeners(usize),
@@ -98,6 +103,19 @@ static OBSERVED: Rows = [
     ),
 ];
 
+/// The rows with and without watchers, in real time.
+static WATCHED: Rows = [
+    (Entry::new("lager/alone", Mode::Block, &[]), Beside::Nobody),
+    (
+        Entry::new("lager/8 watchers", Mode::Block, &["lager/alone"]),
+        Beside::Watchers(8),
+    ),
+    (
+        Entry::new("lager/64 watchers", Mode::Block, &["lager/alone"]),
+        Beside::Watchers(64),
+    ),
+];
+
 /// The rows with and without listeners on other computers, in real time.
 #[cfg(feature = "zenoh")]
 static REMOTE: [(Entry, Beside); 2] = [
@@ -111,21 +129,8 @@ static REMOTE: [(Entry, Beside); 2] = [
 /// The groups of one regime. No row spins: bridge and logic would use two cores, and the boards
 /// need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    let cores = options.cores;
-    let group = |what: &str, rows: &'static [(Entry, Beside)], observed: bool| Group {
-        what: what.to_owned(),
-        regime,
-        entries: rows.iter().map(|(entry, _)| *entry).collect(),
-        rounds: TURNS,
-        samples: [TURN; 2],
-        open: Box::new(move || {
-            Ok(Box::new(Chains::start(
-                cores_for(regime, cores)?,
-                regime,
-                rows,
-                observed,
-            )?))
-        }),
+    let group = |what: &str, rows: &'static [(Entry, Beside)], observed| {
+        group(what, regime, options, rows, observed)
     };
     let wants = |mode| options.modes.contains(&mode);
     // On one core, an adaptive service would spin on the core that the others need.
@@ -140,6 +145,37 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
         groups.push(group("path@remote", &REMOTE, true));
     }
     groups
+}
+
+/// The group with watchers, which belongs to no limit.
+pub(crate) fn watched(regime: Regime, options: &Options) -> Option<Group> {
+    let wanted = options.modes.contains(&Mode::Block) && regime != Regime::SameCore;
+    wanted.then(|| group("path@watched", regime, options, &WATCHED, true))
+}
+
+fn group(
+    what: &str,
+    regime: Regime,
+    options: &Options,
+    rows: &'static [(Entry, Beside)],
+    observed: bool,
+) -> Group {
+    let cores = options.cores;
+    Group {
+        what: what.to_owned(),
+        regime,
+        entries: rows.iter().map(|(entry, _)| *entry).collect(),
+        rounds: TURNS,
+        samples: [TURN; 2],
+        open: Box::new(move || {
+            Ok(Box::new(Chains::start(
+                cores_for(regime, cores)?,
+                regime,
+                rows,
+                observed,
+            )?))
+        }),
+    }
 }
 
 /// The chains that take turns. The thread that plays their boards is bound to a core meanwhile.

@@ -7,7 +7,7 @@ use crate::error::BenchError;
 use crate::group::Group;
 use crate::machine;
 use crate::report::{Options, Report, shown_by_name};
-use crate::{hop, path, publish};
+use crate::{hop, path, publish, watch};
 
 /// A timed measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -16,7 +16,7 @@ pub enum Scenario {
     Hop,
     /// From a sensor frame to the command that it causes.
     Path,
-    /// The time that a writer needs to publish to many subscribers.
+    /// The time that a writer needs to publish to many subscribers, and what many watchers cost.
     Fanout,
 }
 
@@ -36,7 +36,12 @@ impl Scenario {
                     .collect()
             }
             Self::Path => path::groups(*regime, options),
-            Self::Fanout => publish::fan_out(*regime, options),
+            Self::Fanout => {
+                let mut groups = publish::fan_out(*regime, options);
+                groups.extend(watch::groups(*regime, options));
+                groups.extend(path::watched(*regime, options));
+                groups
+            }
         };
         options.regimes.iter().flat_map(of_regime).collect()
     }
@@ -59,7 +64,7 @@ impl Scenario {
             return Err(BenchError::NothingToMeasure(match self {
                 Self::Hop => "nothing works in these modes and regimes",
                 Self::Path => "the path is measured blocking and adaptive, the latter on two cores",
-                Self::Fanout => "the readers look without pause, so it is measured in mode spin",
+                Self::Fanout => "readers look without pause, and watchers block on two cores",
             }));
         }
         if self == Self::Hop {

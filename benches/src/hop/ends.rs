@@ -7,7 +7,7 @@ use std::time::Instant;
 use lager_home::Clock;
 use lager_ports::Bus;
 use lager_sample::{Qos, Stamp, Topic};
-use lager_topics::SensorLine;
+use lager_topics::{Role, SensorLine};
 use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
@@ -97,6 +97,8 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
     (sleeps("lager", &["iceoryx2/event", "futex"]), |one| {
         one.ours(Policy::Block)
     }),
+    // The same between two observers that are woken after everybody else.
+    (sleeps("lager/watcher", &["lager"]), |one| one.watching()),
     // Bare iceoryx2 with the typed ports' header and limits, and an event to sleep on.
     (sleeps("iceoryx2/event", &[]), |one| {
         let member = Member::join(&one.side.config, Some(SensorLine::QOS))?;
@@ -168,6 +170,14 @@ impl One<'_> {
         } else {
             let bus = self.side.bus(RECEIVER)?;
             self.exchange(ours::<Pong, Ping>(&bus, policy)?)
+        }
+    }
+
+    fn watching(&self) -> Result<Noted, BenchError> {
+        let bus = self.side.bus(Role::Observer)?;
+        match self.side.is_first {
+            true => self.exchange(watching::<Ping, Pong>(&bus)?),
+            false => self.exchange(watching::<Pong, Ping>(&bus)?),
         }
     }
 
@@ -280,6 +290,36 @@ where
             if start.get_or_insert_with(Instant::now).elapsed() > LIMIT {
                 return Err(Fault::Silent(LIMIT));
             }
+        }
+    };
+    Ok((send, receive))
+}
+
+/// The same as an observer that is woken.
+fn watching<Out, Back>(bus: &Bus) -> Result<impl End + use<Out, Back>, BenchError>
+where
+    Out: Topic<Payload = Sample>,
+    Back: Topic<Payload = Sample>,
+{
+    let mut subscriber = bus.subscriber::<Back>().map_err(no_bus)?;
+    let mut watcher = bus.watcher().map_err(no_bus)?;
+    subscriber.wakes(&mut watcher);
+    let publisher = bus.publisher::<Out>().map_err(no_bus)?;
+    let send = move |sample: &Sample| {
+        let mut loan = publisher.loan().map_err(broken)?;
+        *loan = *sample;
+        loan.send().map_err(broken)
+    };
+    let receive = move || {
+        let start = Instant::now();
+        loop {
+            if let Some(received) = subscriber.receive().map_err(broken)? {
+                return Ok(*received);
+            }
+            if start.elapsed() > LIMIT {
+                return Err(Fault::Silent(LIMIT));
+            }
+            watcher.wait(TIME_OUT);
         }
     };
     Ok((send, receive))

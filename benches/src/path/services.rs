@@ -26,6 +26,7 @@ use crate::sample::drain;
 pub(super) const BRIDGE: &str = "path, bridge";
 pub(super) const LOGIC: &str = "path, logic";
 const OBSERVER: &str = "path, observer";
+const WATCHER: &str = "path, watcher";
 #[cfg(feature = "zenoh")]
 const GATEWAY: &str = "path, gateway";
 #[cfg(feature = "zenoh")]
@@ -35,6 +36,7 @@ pub(crate) const PROCESSES: &[(&str, Main)] = &[
     (BRIDGE, bridge),
     (LOGIC, logic),
     (OBSERVER, observer),
+    (WATCHER, watcher),
     #[cfg(feature = "zenoh")]
     (GATEWAY, gateway),
     #[cfg(feature = "zenoh")]
@@ -46,6 +48,7 @@ pub(super) fn processes_of(beside: Beside) -> Vec<Vec<&'static str>> {
     match beside {
         Beside::Nobody => Vec::new(),
         Beside::Observers(count) => vec![vec![OBSERVER; count]],
+        Beside::Watchers(count) => vec![vec![WATCHER; count]],
         #[cfg(feature = "zenoh")]
         Beside::Listeners(count) => vec![vec![GATEWAY], vec![LISTENER; count]],
     }
@@ -118,6 +121,22 @@ fn observer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         drain(&mut line)?;
         drain(&mut commands)?;
         std::thread::sleep(LOOK_EVERY);
+    }
+}
+
+/// A watcher: every sample wakes it.
+fn watcher(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let (_, bus) = told(parent, Role::Observer)?;
+    let mut line = bus.subscriber::<SensorLine>()?;
+    let mut commands = bus.subscriber::<SteeringCommand>()?;
+    let mut watcher = bus.watcher()?;
+    line.wakes(&mut watcher);
+    commands.wakes(&mut watcher);
+    parent.say(&())?;
+    loop {
+        drain(&mut line)?;
+        drain(&mut commands)?;
+        watcher.wait(LOOK_EVERY);
     }
 }
 

@@ -1,4 +1,5 @@
-//! Makes every kind of port from a process's [`Bus`]: publishers, subscribers, waiters, requests.
+//! Makes every kind of port from a process's [`Bus`]: publishers, subscribers, waiters, watchers,
+//! requests.
 //!
 //! It is apart from [`Bus`] because the ports use the bus, so the bus must not depend on the ports.
 
@@ -17,6 +18,7 @@ use crate::publisher::Publisher;
 use crate::request::{Client, Server};
 use crate::subscriber::Subscriber;
 use crate::untyped::republish_states;
+use crate::watcher::Watcher;
 
 impl Bus {
     /// A writer of `T`, for this thread. It also rings those actors of `T` that start later.
@@ -65,6 +67,15 @@ impl Bus {
         }
         Waiter::new(self.board(), part, policy, republish_states)
             .map_err(|fault| PortError::of_bell(part, fault))
+    }
+
+    /// A watcher, for this thread. It wakes the thread when a topic has a sample that this process
+    /// only observes. There may be any number of watchers.
+    ///
+    /// # Errors
+    /// A process of another build is on the bus, or a resource is used up.
+    pub fn watcher(&self) -> Result<Watcher, PortError> {
+        Watcher::new(self).map_err(|fault| PortError::of_bell(self.part(), fault))
     }
 
     /// The asking side of `R`, for this thread.

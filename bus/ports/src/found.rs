@@ -2,13 +2,14 @@
 
 use core::fmt;
 
-use lager_sample::{Described, Description, Stamp};
+use lager_sample::{Described, Description, Stamp, id};
 
 use crate::bus::Bus;
 use crate::error::{PortError, ReceiveError};
 use crate::kind::Side;
 use crate::service;
 use crate::untyped::{Reader, Taken};
+use crate::watcher::Watcher;
 
 /// The reading end of a topic of which only the name is known; stays in the thread that made it.
 pub struct Found {
@@ -58,6 +59,11 @@ impl Found {
         let taken = self.reader.receive()?;
         let lost = self.reader.streams().lost();
         Ok(taken.map(|taken| (FoundSample { taken, description }, lost)))
+    }
+
+    /// Lets each of its samples wake the thread of `watcher`.
+    pub fn wakes(&self, watcher: &mut Watcher) {
+        watcher.add(id(&self.name), self.reader.peek());
     }
 
     /// Samples missed, as [`crate::Subscriber::lost`] counts them.

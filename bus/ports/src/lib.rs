@@ -26,15 +26,16 @@
 //! # }
 //! ```
 //!
-//! Other programs can define payloads and topics of their own: `examples/` has one program that
-//! publishes, one that acts and one that observes. A process that creates a topic also states the
-//! layout of its samples, so [`Bus::found`] reads a topic with which this process was not built.
+//! Other programs can define payloads and topics of their own: `examples/` has programs that publish,
+//! act, observe and watch. A process that creates a topic also states the layout of its samples, so
+//! [`Bus::found`] reads a topic with which this process was not built.
 //!
 //! * Queues overwrite. A subscriber that falls behind loses the oldest samples and never blocks the
 //!   publisher; [`Subscriber::lost`] says exactly how many samples it missed.
 //! * The services that act on a topic (its actors) get each sample first, through an iceoryx2
 //!   service of their own, and are woken through their [`Waiter`](lager_wake::Waiter). Everybody
-//!   else (observers) then gets a copy with the same stamp. Observers are never woken; they poll.
+//!   else (observers) then gets a copy with the same stamp. Observers poll, or ask to be woken after
+//!   that ([`Watcher`]).
 //! * A program of plain iceoryx2 reads the service under the topic's name. Samples that it writes
 //!   there reach observers only. To reach the actors, it must also write to `<name>:actors`.
 //! * The next [`Bus::open`] or [`Bus::sweep`] removes what a killed process left behind.
@@ -70,6 +71,7 @@ mod subscriber;
 mod sweep;
 mod transport;
 mod untyped;
+mod watcher;
 
 pub use any::AnyPublisher;
 pub use bus::Bus;
@@ -87,6 +89,7 @@ pub use request::{Client, Server};
 pub use source::{Look, Raw, Source, newest};
 pub use streams::Streams;
 pub use subscriber::{Sample, Subscriber};
+pub use watcher::Watcher;
 
 /// The software that carries the bus. All processes on one bus must have the same version of it.
 pub const BUS_VERSION: &str = "iceoryx2 0.10.0";

@@ -13,6 +13,7 @@ use crate::found::Found;
 use crate::introspect::TopicInfo;
 use crate::source::Source;
 use crate::subscriber::Subscriber;
+use crate::watcher::Watcher;
 
 /// What a watch tells changes of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,6 +113,15 @@ pub trait Place {
     /// It is there and cannot be read.
     fn described(&self, name: &str) -> Result<Option<Self::Found>, Self::OpenError>;
 
+    /// A watcher, for this thread, which samples of this place can wake; `None` if nobody rings for
+    /// them here.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    fn watcher(&self) -> Result<Option<Watcher>, Self::OpenError> {
+        Ok(None)
+    }
+
     /// Every topic that is there, of this unit.
     ///
     /// # Errors
@@ -162,6 +172,10 @@ impl Place for Bus {
 
     fn described(&self, name: &str) -> Result<Option<Found>, PortError> {
         self.found(name)
+    }
+
+    fn watcher(&self) -> Result<Option<Watcher>, PortError> {
+        Self::watcher(self).map(Some)
     }
 
     fn every_topic(&self) -> Result<Vec<TopicInfo>, IntrospectError> {

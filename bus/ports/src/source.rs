@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::error::ReceiveError;
 use crate::found::Found;
 use crate::subscriber::Subscriber;
+use crate::watcher::Watcher;
 
 /// A function to be called with one sample, whose payload serde can serialize.
 pub trait Look {
@@ -107,6 +108,9 @@ pub trait Source {
 
     /// How many samples can wait for this reader; one more overwrites the oldest.
     fn queue(&self) -> usize;
+
+    /// Lets its samples wake the thread of `watcher`, if they come from this machine's bus.
+    fn wakes(&self, _watcher: &mut Watcher) {}
 }
 
 impl<T: Topic> Source for Subscriber<T> {
@@ -132,6 +136,10 @@ impl<T: Topic> Source for Subscriber<T> {
 
     fn queue(&self) -> usize {
         T::QOS.buffer
+    }
+
+    fn wakes(&self, watcher: &mut Watcher) {
+        Self::wakes(self, watcher);
     }
 }
 
@@ -162,5 +170,9 @@ impl Source for Found {
 
     fn queue(&self) -> usize {
         Self::queue(self)
+    }
+
+    fn wakes(&self, watcher: &mut Watcher) {
+        Self::wakes(self, watcher);
     }
 }

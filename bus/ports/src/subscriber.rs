@@ -12,6 +12,7 @@ use crate::cause::Cause;
 use crate::error::{PortError, ReceiveError};
 use crate::kind::Kind;
 use crate::untyped::{Reader, Taken};
+use crate::watcher::Watcher;
 
 /// The reading end of a topic; stays in the thread that made it.
 pub struct Subscriber<T: Topic> {
@@ -47,6 +48,12 @@ impl<T: Topic> Subscriber<T> {
     /// at most two samples during the call.
     pub fn latest(&mut self) -> Result<Option<Sample<T>>, ReceiveError> {
         Ok(self.reader.latest()?.map(Sample::of))
+    }
+
+    /// Lets each of its samples wake the thread of `watcher`. An actor has a
+    /// [`Waiter`](lager_wake::Waiter) instead, which is woken first.
+    pub fn wakes(&self, watcher: &mut Watcher) {
+        watcher.add(T::ID, self.reader.peek());
     }
 
     /// How many writers this reader could not connect to, now or earlier: a writer was killed, or

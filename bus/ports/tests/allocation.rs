@@ -1,12 +1,13 @@
 //! Proves with a counting allocator that the hot path does not allocate.
 //!
-//! Once writers and readers have met, loaning, sending, ringing, waiting, receiving, ticking and
-//! counting losses allocate nothing.
+//! Once writers and readers have met, and the first watcher was woken, loaning, sending, ringing,
+//! waiting, receiving, ticking and counting losses allocate nothing.
 //!
 //! This is a program of its own because the allocator counts for the whole process. It has only one
 //! test, so that nothing else runs meanwhile; allocations of other threads do not count.
 
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use lager_ports::{Bus, BusConfig, Cause};
 use lager_rig::Domain;
@@ -24,12 +25,39 @@ fn nothing_is_allocated_per_frame() {
 
     let domain = Domain::new("lager-ports").unwrap();
     for policy in [Policy::Block, Policy::Spin, Policy::ADAPTIVE] {
-        exchange(&domain.config(), policy);
+        let (ends, woken) = (AtomicBool::new(false), AtomicU64::new(0));
+        std::thread::scope(|scope| {
+            scope.spawn(|| watch(&domain.config(), &ends, &woken));
+            let _ends = Ends(&ends);
+            exchange(&domain.config(), policy, &woken);
+        });
+    }
+}
+
+/// Ends the watcher, also when the test fails.
+struct Ends<'a>(&'a AtomicBool);
+
+impl Drop for Ends<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+/// A watcher in a thread of its own; `woken` says how often it was.
+fn watch(config: &BusConfig, ends: &AtomicBool, woken: &AtomicU64) {
+    let bus = Bus::open(config, Role::Observer).unwrap();
+    let mut line = bus.subscriber::<SensorLine>().unwrap();
+    let mut watcher = bus.watcher().unwrap();
+    line.wakes(&mut watcher);
+    while !ends.load(Ordering::Acquire) {
+        watcher.wait(Duration::from_millis(10));
+        while line.receive().unwrap().is_some() {}
+        woken.store(watcher.woken(), Ordering::Release);
     }
 }
 
 /// From sensor frame to order, again and again, with observers attached.
-fn exchange(config: &BusConfig, policy: Policy) {
+fn exchange(config: &BusConfig, policy: Policy, woken: &AtomicU64) {
     let bridge = Bus::open(config, Role::Bridge).unwrap();
     let logic = Bus::open(config, Role::Logic).unwrap();
     let waiter = logic.waiter(policy).unwrap();
@@ -71,6 +99,13 @@ fn exchange(config: &BusConfig, policy: Policy) {
     frame();
     receive();
     order();
+    // The first ring for a watcher starts the thread that wakes it.
+    let began = Instant::now();
+    while woken.load(Ordering::Acquire) == 0 {
+        assert!(began.elapsed() < Duration::from_secs(60), "it is not woken");
+        frame();
+        receive();
+    }
 
     for _ in 0..200 {
         assert_eq!(allocations(frame), 0, "{policy}: send and ring");

@@ -23,7 +23,7 @@ pub struct Part {
 
 impl Part {
     /// The most parts that the processes of one bus can play.
-    pub const MOST: usize = 16;
+    pub const MOST: usize = 32;
 
     /// A part with a number below [`Part::MOST`] and a name of `a`-`z`, `0`-`9`, `-` and `_`.
     ///
@@ -34,7 +34,7 @@ impl Part {
     pub const fn new(number: u8, name: &'static str) -> Self {
         assert!(
             (number as usize) < Self::MOST,
-            "a part's number is below 16"
+            "a part's number is below 32"
         );
         assert!(
             is_name(name.as_bytes()),
@@ -48,7 +48,8 @@ impl Part {
     }
 
     /// The same for processes that only observe. They share each topic's places for observers, so
-    /// they never take the place of a process that acts, and nobody wakes them.
+    /// they never take the place of a process that acts, and a sample wakes them last, if they ask
+    /// for it.
     pub const fn observing(self) -> Self {
         Self {
             observes: true,

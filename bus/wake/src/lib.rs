@@ -4,9 +4,11 @@
 //! it looks without pause, or it looks only when a ring is due. A writer of samples rings through a
 //! [`PartRinger`]. Both use a [`Board`] of bells in shared memory. This crate never opens the bus.
 //!
+//! An observer that asks to be woken sleeps in a [`Watch`]. Writers wake it through a [`WatchRinger`].
+//!
 //! * [`Shutdown`] is a request to stop, and [`Watchdog`] watches calls that may never return.
-//! * [`urgency`] says which thread gets a core first. [`Pace`] says how often an observer looks,
-//!   because nobody wakes it.
+//! * [`urgency`] says which thread gets a core first. [`Pace`] says how often an observer looks that
+//!   nobody wakes.
 
 mod bell;
 mod pace;
@@ -16,7 +18,10 @@ pub mod urgency;
 mod waiter;
 mod watchdog;
 
-pub use bell::{AllRinger, Board, BoardFault, PartRinger, SEATS_PER_PART, sweep, sweep_all, woken};
+pub use bell::{
+    AllRinger, Board, BoardFault, PartRinger, SEATS_PER_PART, Watch, WatchRinger, sweep, sweep_all,
+    woken,
+};
 pub use pace::Pace;
 pub use policy::{Policy, PolicyError};
 pub use shutdown::Shutdown;

@@ -35,6 +35,9 @@ use crate::policy::Policy;
 /// The shortest time slice that Linux gives. The default was 1.4 ms where this was measured.
 const SLICE: Duration = Duration::from_micros(100);
 
+/// The time slice of a thread that may wait; about Linux's default.
+const LONG_SLICE: Duration = Duration::from_millis(3);
+
 /// Puts the calling thread under `SCHED_FIFO`, where it goes before all threads of a lower priority
 /// and of the normal scheduler. Priorities are 1 to 99.
 ///
@@ -100,6 +103,21 @@ fn lower(steps: u8) -> io::Result<()> {
     set(&how)
 }
 
+/// Puts the calling thread under the normal scheduler with slices of 3 ms, behind all threads of the
+/// path, whatever it has inherited.
+pub(crate) fn stand_back() {
+    // A sandbox may forbid the call. The thread then stays as it was.
+    let done = scheduled().and_then(|mut how| {
+        how.sched_policy = libc::SCHED_OTHER as u32;
+        how.sched_priority = 0;
+        how.sched_runtime = LONG_SLICE.as_nanos() as u64;
+        set(&how)
+    });
+    if let Err(error) = done {
+        tracing::debug!("not behind the path: {error}");
+    }
+}
+
 /// Lets the kernel end the calling thread's waits later, by at most this time, together with those
 /// of other threads. Threads under `SCHED_FIFO` still wake on time.
 pub fn wake_with_others(late_at_most: Duration) {
@@ -146,6 +164,8 @@ mod tests {
             assert!(!is_real_time());
             let may = set_fifo(1).is_ok();
             assert_eq!(is_real_time(), may);
+            stand_back();
+            assert!(!is_real_time());
         })
         .join()
         .expect("it knows");

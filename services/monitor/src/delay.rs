@@ -1,8 +1,8 @@
 //! `topic delay`: how old samples are when they are published, and when an observer gets them.
 //!
-//! Nobody wakes an observer. It looks every millisecond, and a sample waits for the next look. This
-//! wait says nothing about the bus. So the tool notes when each look begins, and reports the wait
-//! separately:
+//! The tool is woken when everybody else has the sample. Over a robot's gateway nobody wakes it; it
+//! looks every millisecond, and a sample waits for the next look. So the tool notes when each look
+//! begins, and reports the wait separately:
 //!
 //! ```text
 //!  source_time --> publish_time ~~~~> look --> received
@@ -29,8 +29,8 @@ use crate::measure::{Arrival, Gauge, Limits, Plan};
 use crate::origin::Origin;
 use crate::{ToolError, Tools};
 
-/// The time between two looks. It is a fifth of the other tools' shortest one, so the wait is
-/// short.
+/// The time between two looks where nobody wakes it. It is a fifth of the other tools' shortest one,
+/// so the wait is short.
 const POLL: Duration = Duration::from_millis(1);
 
 /// Longer delays are not told apart, in ns: a minute.
@@ -45,6 +45,7 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
         let plan = Plan {
             limits,
             pace: Pace::every(POLL),
+            woken: true,
             head: HEAD,
             needs_clock: true,
             gauge: |_| Delays::default(),

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::io::Write;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use lager_ports::Source;
 use lager_sample::{Description, Stamp, Topic};
@@ -14,7 +14,11 @@ use crate::block::Blocks;
 use crate::measure::Limits;
 use crate::origin::Origin;
 use crate::source::Shown;
+use crate::wakeful::Wakeful;
 use crate::{Count, POLL, ToolError, Tools};
+
+/// The shortest time between two wakes. No eye sees the samples of 2 ms one after the other.
+const REST: Duration = Duration::from_millis(2);
 
 /// What `topic echo` shows, and when it ends.
 #[derive(Clone, Debug, Default)]
@@ -92,10 +96,12 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
         let began = Instant::now();
         let mut heard = began;
         urgency::wake_with_others(POLL);
+        let mut wakeful = Wakeful::new(self, &from, POLL, REST)?;
         while !self.shutdown.is_requested() && !config.limits.are_reached(began, shown) {
             let Some((stamp, payload)) = self.receive(&mut from, Shown)? else {
                 self.out.flush()?;
-                self.pause(heard, POLL)?;
+                self.ask_why(heard)?;
+                wakeful.wait(config.limits.left(began));
                 continue;
             };
             let payload = payload?;

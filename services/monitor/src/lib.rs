@@ -8,8 +8,8 @@
 //! Where samples come from is an [`Origin`]: the bus, or with the feature `zenoh` a robot's gateway on
 //! another computer. The tools are the same.
 //!
-//! All tools but `pub` are observers: they poll, hold no listener and never slow the path. They
-//! know no topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`.
+//! All tools but `pub` are observers: they poll, or are woken when everybody else has the sample
+//! (`echo`, `delay`; `wakeful.rs`). They hold no listener and never slow the path. They know no topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`.
 //! The table leads from a name to its static type. A topic that is not in the table carries its own
 //! description. Each tool writes text, or one JSON value in each line, and says how many samples it
 //! lost. A watchdog guards every call into the bus, so a tool reports a bus that does not answer,
@@ -29,6 +29,7 @@ mod rate;
 mod sentence;
 mod source;
 mod top;
+mod wakeful;
 
 use std::fmt;
 use std::io::{self, Write};
@@ -48,7 +49,7 @@ pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
 pub use top::{Lacking, Load, Recorded, TopConfig, leave_screen};
 
-/// How often `topic echo` and `top` look.
+/// How often `top` looks, and `topic echo` where nobody wakes it.
 const POLL: Duration = Duration::from_millis(5);
 
 /// What a tool works with. Each tool is a method of it.
@@ -99,16 +100,15 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
         Ok(self.watchdog.over("reading the topic", receive)?)
     }
 
-    /// Waits a moment for the next sample. A subscriber gets no error if it cannot reach its
-    /// writer, or if somebody has replaced the bus. So after a silence the tool asks why.
-    fn pause(&self, silent_since: Instant, pace: Duration) -> Result<(), ToolError> {
+    /// Asks why nothing has come for so long. A subscriber gets no error if it cannot reach its writer,
+    /// or if somebody has replaced the bus.
+    fn ask_why(&self, silent_since: Instant) -> Result<(), ToolError> {
         if silent_since.elapsed() >= SILENCE {
             if let Some(shortage) = Shortage::now() {
                 return Err(ToolError::Short(shortage));
             }
             self.must_still_tell()?;
         }
-        std::thread::sleep(pace);
         Ok(())
     }
 }

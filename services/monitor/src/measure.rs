@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use crate::origin::Origin;
 use crate::source::Stamped;
+use crate::wakeful::Wakeful;
 use crate::{ToolError, Tools};
 
 /// The tool prints one line for each window.
@@ -27,6 +28,14 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// How long the tool still has.
+    pub(crate) fn left(&self, began: Instant) -> Duration {
+        match self.duration {
+            Some(duration) => duration.saturating_sub(began.elapsed()),
+            None => Duration::MAX,
+        }
+    }
+
     /// Whether the tool ends after this time and this many samples.
     pub(crate) fn are_reached(&self, began: Instant, samples: u64) -> bool {
         self.count.is_some_and(|count| samples >= count)
@@ -64,7 +73,10 @@ pub(crate) trait Gauge {
 /// What to measure, and how.
 pub(crate) struct Plan<F> {
     pub(crate) limits: Limits,
+    /// How often it looks.
     pub(crate) pace: Pace,
+    /// Whether it is woken for each sample where that can be.
+    pub(crate) woken: bool,
     /// The head line; empty for none.
     pub(crate) head: &'static str,
     /// Whether it compares stamps with the time of their arrival.
@@ -102,6 +114,10 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
         let (mut total, mut lost, mut is_over) = (0, 0, false);
         let mut heard = began;
         let mut pace = plan.pace.clone();
+        let mut wakeful = match plan.woken {
+            true => Some(Wakeful::new(self, &from, pace.wait(), Duration::ZERO)?),
+            false => None,
+        };
         if !self.as_json && !plan.head.is_empty() {
             let unsure_ns = self.place.time().unsure_ns;
             if unsure_ns > 0 {
@@ -139,7 +155,14 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
                 is_over |= plan.limits.are_reached(began, total);
                 if !is_over {
                     pace.found(total - so_far, from.queue());
-                    self.pause(heard, pace.wait())?;
+                    self.ask_why(heard)?;
+                    let left = plan.limits.left(began);
+                    match &mut wakeful {
+                        Some(wakeful) => {
+                            wakeful.wait(left.min(end.saturating_duration_since(Instant::now())));
+                        }
+                        None => std::thread::sleep(pace.wait()),
+                    }
                 }
             }
             // A loss over a link is taken back if the sample comes late.

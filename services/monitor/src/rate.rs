@@ -38,6 +38,7 @@ fn plan<F>(limits: Limits, gauge: F) -> Plan<F> {
     Plan {
         limits,
         pace: Pace::counting(),
+        woken: false,
         head: "",
         needs_clock: false,
         gauge,

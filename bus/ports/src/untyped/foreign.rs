@@ -5,7 +5,7 @@ use core::cell::{Cell, OnceCell};
 
 use iceoryx2::prelude::PortFactory;
 use lager_sample::{Description, Stamp, id};
-use lager_wake::AllRinger;
+use lager_wake::{AllRinger, WatchRinger};
 
 use super::outlet::Outlet;
 use super::writer::new_epoch;
@@ -27,6 +27,7 @@ pub(crate) struct Foreign {
     /// Whether the topic keeps its last sample for readers that come later.
     pub(crate) holds: bool,
     ringer: AllRinger,
+    watchers: WatchRinger,
     next_sequence: Cell<u64>,
     epoch: u64,
 }
@@ -47,6 +48,8 @@ impl Foreign {
             actors: OnceCell::new(),
             size: description.size(),
             ringer: AllRinger::to(bus.board(), id(name))
+                .map_err(|fault| PortError::of_bell(bus.part(), fault))?,
+            watchers: WatchRinger::to(bus.board(), id(name))
                 .map_err(|fault| PortError::of_bell(bus.part(), fault))?,
             next_sequence: Cell::new(0),
             // Taken after the port exists, as a typed writer does.
@@ -103,6 +106,7 @@ impl Foreign {
         if acting.is_none() {
             self.ringer.ring();
         }
+        self.watchers.ring();
         acted.and(sent)
     }
 

@@ -40,7 +40,7 @@ use crate::service::TopicService;
 pub(crate) use asking::{Answerer, Asker};
 pub(crate) use foreign::Foreign;
 pub(crate) use outlet::{Lent, republish_states};
-pub(crate) use reader::{Reader, Taken};
+pub(crate) use reader::{Peek, Reader, Taken};
 pub(crate) use writer::{To, Writer};
 
 ends_here!(TopicService);

@@ -1,6 +1,7 @@
 //! [`Reader`]: receives a topic's samples without the payload's type.
 
 use core::ptr::NonNull;
+use std::rc::{Rc, Weak};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -24,7 +25,7 @@ use crate::transport::Ipc;
 
 /// [`crate::Subscriber`] without the payload's type.
 pub(crate) struct Reader {
-    port: Here<Port>,
+    port: Rc<Here<Port>>,
     payload_align: usize,
     holds: bool,
     streams: Streams,
@@ -40,6 +41,22 @@ type Port = Subscriber<Ipc, Bytes, Header>;
 type Received = Sample<Ipc, Bytes, Header>;
 
 ends_here!(Port, Received);
+
+/// Tells whether samples wait for a reader; may outlive it.
+pub(crate) struct Peek(Weak<Here<Port>>);
+
+impl Peek {
+    /// Whether a sample waits. Also true if that cannot be told, so that the reader is asked.
+    pub(crate) fn has_samples(&self) -> bool {
+        let port = self.0.upgrade();
+        port.is_some_and(|port| port.has_samples().unwrap_or(true))
+    }
+
+    /// Whether the reader is gone.
+    pub(crate) fn is_over(&self) -> bool {
+        self.0.strong_count() == 0
+    }
+}
 
 /// A received sample. The reader holds it until this is dropped.
 pub(crate) struct Taken {
@@ -122,7 +139,7 @@ impl Reader {
             Ok(subscriber)
         })?;
         Ok(Self {
-            port: Here::new(port),
+            port: Rc::new(Here::new(port)),
             payload_align: limits.message_type_details().payload.alignment(),
             holds: limits.history_size() > 0,
             // Taken after the port exists: a publisher that is younger has seen the port since its
@@ -142,6 +159,11 @@ impl Reader {
     /// How many samples can wait for this reader.
     pub(crate) fn queue(&self) -> usize {
         self.port.buffer_size()
+    }
+
+    /// To be asked whether samples wait.
+    pub(crate) fn peek(&self) -> Peek {
+        Peek(Rc::downgrade(&self.port))
     }
 
     /// The next sample, oldest first.

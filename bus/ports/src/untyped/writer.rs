@@ -1,11 +1,12 @@
-//! [`Writer`]: sends samples to a topic's actors, rings them, and then sends to everybody else.
+//! [`Writer`]: sends samples to a topic's actors, rings them, and then sends to everybody else and
+//! has those watchers woken that sleep.
 
 use core::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use lager_home::Clock;
 use lager_sample::Stamp;
-use lager_wake::PartRinger;
+use lager_wake::{PartRinger, WatchRinger};
 
 use super::copies::Copies;
 use super::outlet::{Lent, Outlet};
@@ -26,6 +27,7 @@ pub(crate) struct Writer {
     behind: Cell<bool>,
     standard: Here<StandardListeners>,
     ringers: Box<[PartRinger]>,
+    watchers: WatchRinger,
     next_sequence: Cell<u64>,
     epoch: u64,
     writer: u32,
@@ -56,6 +58,8 @@ impl Writer {
                     .map_err(|fault| PortError::of_bell(*actor, fault))
             })
             .collect::<Result<_, _>>()?;
+        let watchers = WatchRinger::to(bus.board(), kind.id)
+            .map_err(|fault| PortError::of_bell(bus.part(), fault))?;
         let standard = StandardListeners::of(bus, kind)?;
         let (copies, side) = if kind.qos.serves_actors_first() {
             (Some(Copies::new(bus, kind)?), Side::Actors)
@@ -68,6 +72,7 @@ impl Writer {
             behind: Cell::new(false),
             standard: Here::new(standard),
             ringers,
+            watchers,
             next_sequence: Cell::new(0),
             // Taken after the ports exist: a subscriber that is older than the epoch was there for
             // every sample, so it may count losses from number 0 on.
@@ -142,6 +147,7 @@ impl Writer {
             return Ok(());
         }
         let copied = self.copies.as_ref().map_or(Ok(()), Copies::publish);
+        self.watchers.ring();
         self.standard.notify();
         copied
     }

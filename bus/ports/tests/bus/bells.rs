@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use lager_ports::remove_stale_nodes;
 use lager_rig::Process;
 use lager_topics::{Role, SensorLine};
-use lager_wake::{Policy, Wake};
+use lager_wake::{Policy, SEATS_PER_PART, Wake};
 
 use crate::domain::{Domain, send, until};
 use crate::process;
@@ -79,7 +79,7 @@ fn waiters_killed_anywhere_give_their_seats_to_their_successors() {
         somewhere(round);
         victims.into_iter().for_each(Process::kill);
         // Nobody sweeps, but a new waiter must still get every seat of the role.
-        let successors: Vec<_> = (0..7)
+        let successors: Vec<_> = (1..SEATS_PER_PART)
             .map(|_| logic.waiter(Policy::Block).unwrap())
             .collect();
         send(&publisher, 1);

@@ -80,9 +80,10 @@ fn built(name: &str) -> PathBuf {
 }
 
 #[test]
-fn the_examples_publish_act_and_observe() {
+fn the_examples_publish_act_observe_and_watch() {
     let domain = Domain::new();
     let mut observer = Example::start(&domain, "observe");
+    let mut watcher = Example::start(&domain, "watch");
     let mut actor = Example::start(&domain, "act");
     let publisher = Example::start(&domain, "publish");
     let acted = actor.line("wind 3 mm/s, received after ");
@@ -93,7 +94,9 @@ fn the_examples_publish_act_and_observe() {
         "{seen}"
     );
     assert_eq!(observer.line(" lost"), "0 lost");
-    drop((observer, actor, publisher));
+    let woken = watcher.line("wind: 3,");
+    assert_eq!(woken, seen);
+    drop((observer, watcher, actor, publisher));
 }
 
 #[test]

@@ -89,7 +89,7 @@ fn too_many_writers_are_refused_and_a_free_place_can_be_taken() {
 fn too_many_waiters_are_refused_and_a_free_seat_can_be_taken() {
     let domain = Domain::new();
     let buses = [domain.open(Role::Logic), domain.open(Role::Logic)];
-    let mut waiters: Vec<_> = (0..8)
+    let mut waiters: Vec<_> = (0..32)
         .map(|index| buses[index % 2].waiter(Policy::Block).unwrap())
         .collect();
     let refused = buses[0].waiter(Policy::Block).unwrap_err();
@@ -97,7 +97,7 @@ fn too_many_waiters_are_refused_and_a_free_seat_can_be_taken() {
         refused,
         PortError::TooManyWaiters {
             part: Role::Logic.part(),
-            limit: 8
+            limit: 32
         }
     );
     assert!(refused.to_string().contains("stop a logic that runs twice"));

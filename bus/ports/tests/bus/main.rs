@@ -18,3 +18,4 @@ mod samples;
 mod stress;
 mod swept;
 mod waiting;
+mod watching;

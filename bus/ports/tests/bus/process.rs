@@ -123,6 +123,18 @@ fn child() {
             ready();
             end_with_parent();
         }
+        "watcher" => {
+            let bus = open(Role::Observer);
+            let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+            let mut watcher = bus.watcher().unwrap();
+            subscriber.wakes(&mut watcher);
+            std::thread::spawn(|| end_with_parent());
+            ready();
+            loop {
+                watcher.wait(Duration::from_secs(3600));
+                while subscriber.receive().unwrap().is_some() {}
+            }
+        }
         "navigator-waits" => {
             // Sleeps whenever it can.
             let bus = open(Role::Logic);

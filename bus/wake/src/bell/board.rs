@@ -1,15 +1,17 @@
 //! [`Board`]: the contents of the bell board in shared memory, and the operations on them.
 //!
 //! ```text
-//!     0   head       magic and layout version
-//!     64  callers    for each part: which seats to ring            read by every ring
-//!     128 spinners   which seats look without pause                written now and then
-//!     256 seat 0     the word, its reasons, its process id         written by every ring
-//!     384 seat 1     …                                             32 seats of 128 bytes
+//!     0    head      magic and layout version
+//!     64   callers   for each part: which seats to ring            read by every ring
+//!     320  spinners  which seats look without pause                written now and then
+//!     384  seat 0    the word, its reasons, its process id         written by every ring
+//!     512  seat 1    …                                             64 seats of 128 bytes
+//!     8576 watched   the words on which watchers sleep             read at every sample
 //! ```
 //!
 //! A seat has 128 bytes because processors fetch cache lines in pairs: ringing a neighbour must not
-//! disturb a waiter that looks without pause.
+//! disturb a waiter that looks without pause. Watchers have no seats: any number of them sleep on the
+//! word of their topic. If two topics share a word, a sample of one wakes the watchers of both.
 //!
 //! **Invariant:** nothing here makes a system call. The locks of `segment.rs` decide who may write:
 //! only the holder of a seat's lock writes its callers, its spinner bit and its process id.
@@ -21,14 +23,17 @@ use lager_sample::Part;
 use super::word;
 
 /// The most waiters on one board at the same time.
-pub(crate) const SEATS: usize = 32;
+pub(crate) const SEATS: usize = 64;
 
-/// The most waiters of one part at a time: the actor, its successor, and some for tools and tests.
-pub const SEATS_PER_PART: usize = 8;
+/// The most waiters of one part at a time, so that one part cannot take the seats of all others.
+pub const SEATS_PER_PART: usize = 32;
+
+/// The number of words for watchers.
+pub(crate) const WATCHED: usize = 1024;
 
 /// "lagerbel" and the layout's version. Change the version whenever [`Board`] or the word changes.
 const MAGIC: u64 = u64::from_be_bytes(*b"lagerbel") ^ VERSION;
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 
 #[repr(C, align(64))]
 struct Line<T>(T);
@@ -41,6 +46,20 @@ pub(crate) struct Seat {
     pub(super) reasons: [AtomicU8; REASONS],
 }
 
+impl Default for Seat {
+    fn default() -> Self {
+        Self {
+            word: AtomicU32::new(0),
+            pid: AtomicU32::new(0),
+            reasons: [const { AtomicU8::new(0) }; REASONS],
+        }
+    }
+}
+
+/// The word on which the watchers of a topic sleep.
+#[repr(transparent)]
+pub(crate) struct WatchWord(pub(super) AtomicU32);
+
 /// The number of reasons of a seat: as many as fit into the word's cache line.
 pub(crate) const REASONS: usize = 56;
 
@@ -48,14 +67,15 @@ pub(crate) const REASONS: usize = 56;
 #[repr(C)]
 pub(crate) struct Board {
     magic: Line<AtomicU64>,
-    callers: Line<[AtomicU32; Part::MOST]>,
-    spinners: Line<AtomicU32>,
+    callers: Line<[AtomicU64; Part::MOST]>,
+    spinners: Line<AtomicU64>,
     seats: [Seat; SEATS],
+    watched: [WatchWord; WATCHED],
 }
 
-const _: () = assert!(size_of::<Board>() == 256 + 128 * SEATS);
+const _: () = assert!(size_of::<Board>() == 384 + 128 * SEATS + 4 * WATCHED);
 const _: () = assert!(core::mem::offset_of!(Seat, reasons) + REASONS == 64);
-const _: () = assert!(SEATS <= 32);
+const _: () = assert!(SEATS <= 64);
 
 /// The layout of a board that another process has made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +106,12 @@ impl Board {
         &self.seats[seat % SEATS]
     }
 
+    /// One of the words for watchers.
+    #[inline]
+    pub(crate) fn watched(&self, word: usize) -> &WatchWord {
+        &self.watched[word % WATCHED]
+    }
+
     /// Rings every waiter of `part`.
     #[inline]
     pub(crate) fn ring(&self, part: Part, reason: usize) {
@@ -110,7 +136,7 @@ impl Board {
     }
 
     #[inline]
-    fn each_in(&self, mut seats: u32, does: impl Fn(&Seat)) {
+    fn each_in(&self, mut seats: u64, does: impl Fn(&Seat)) {
         while seats != 0 {
             does(self.seat(seats.trailing_zeros() as usize));
             seats &= seats - 1;
@@ -118,12 +144,12 @@ impl Board {
     }
 
     /// The seats of `part` as bits, including those of killed processes.
-    pub(crate) fn seats_of(&self, part: Part) -> u32 {
+    pub(crate) fn seats_of(&self, part: Part) -> u64 {
         self.callers_of(part).load(Ordering::Acquire)
     }
 
     /// All taken seats as bits, including those of killed processes.
-    pub(crate) fn taken(&self) -> u32 {
+    pub(crate) fn taken(&self) -> u64 {
         let masks = self.callers.0.iter();
         masks.fold(0, |all, seats| all | seats.load(Ordering::Acquire))
             | self.spinners.0.load(Ordering::Acquire)
@@ -155,7 +181,7 @@ impl Board {
     /// Asks for the right to look without pause, which at most `limit` waiters have at a time. A
     /// waiter that gets the right keeps it until [`Board::stop_spinning`].
     pub(crate) fn may_spin(&self, seat: usize, limit: usize) -> bool {
-        let granted = |spinners: u32| {
+        let granted = |spinners: u64| {
             let with_me = spinners | 1 << seat;
             (with_me.count_ones() as usize <= limit).then_some(with_me)
         };
@@ -171,7 +197,7 @@ impl Board {
         }
     }
 
-    fn callers_of(&self, part: Part) -> &AtomicU32 {
+    fn callers_of(&self, part: Part) -> &AtomicU64 {
         &self.callers.0[usize::from(part.number()) % Part::MOST]
     }
 }
@@ -184,16 +210,12 @@ mod tests {
     const BRIDGE: Part = Part::new(0, "bridge");
 
     fn blank() -> Box<Board> {
-        let line = |value| Line(AtomicU32::new(value));
         Box::new(Board {
             magic: Line(AtomicU64::new(0)),
-            callers: Line(Default::default()),
-            spinners: line(0),
-            seats: core::array::from_fn(|_| Seat {
-                word: AtomicU32::new(0),
-                pid: AtomicU32::new(0),
-                reasons: [const { AtomicU8::new(0) }; REASONS],
-            }),
+            callers: Line([const { AtomicU64::new(0) }; Part::MOST]),
+            spinners: Line(AtomicU64::new(0)),
+            seats: core::array::from_fn(|_| Seat::default()),
+            watched: [const { WatchWord(AtomicU32::new(0)) }; WATCHED],
         })
     }
 
@@ -201,25 +223,25 @@ mod tests {
     fn a_ring_reaches_the_seats_of_its_role_only() {
         let board = blank();
         board.take(3, LOGIC, 30);
-        board.take(31, LOGIC, 310);
+        board.take(63, LOGIC, 630);
         board.take(4, BRIDGE, 40);
         board.ring(LOGIC, 5);
         let count = |seat| board.seat(seat).word.load(Ordering::Relaxed);
         let rung: Vec<_> = (0..SEATS).filter(|seat| count(*seat) != 0).collect();
-        assert_eq!(rung, [3, 31]);
+        assert_eq!(rung, [3, 63]);
         board.clear(3);
         board.ring(LOGIC, 6);
-        assert_eq!([count(3), count(31)], [2, 4]);
+        assert_eq!([count(3), count(63)], [2, 4]);
         let rung_for = |seat, reason| word::rung_for(board.seat(seat), reason);
         assert_eq!(
             [5, 6, 7].map(|reason| rung_for(3, reason)),
             [true, false, false]
         );
         assert_eq!(
-            [5, 6, 7].map(|reason| rung_for(31, reason)),
+            [5, 6, 7].map(|reason| rung_for(63, reason)),
             [true, true, false]
         );
-        assert!(!rung_for(31, 5), "a reason is taken once");
+        assert!(!rung_for(63, 5), "a reason is taken once");
     }
 
     #[test]

@@ -14,13 +14,13 @@ use loom::sync::atomic::{AtomicBool, AtomicU32};
 use loom::sync::{Arc, Condvar, Mutex};
 use loom::thread;
 
-use super::word::{self, Ended, Sleeper, Word};
+use super::word::{self, Ended, Rung, Sleeper, Word};
 
 /// How many switches between threads that the code does not force there may be in one run. Loom's
 /// authors find all known bugs with two or three; without a bound a run takes hours.
 const PREEMPTIONS: usize = 3;
 
-fn under_bounded_interleavings(run: impl Fn() + Sync + Send + 'static) {
+pub(super) fn under_bounded_interleavings(run: impl Fn() + Sync + Send + 'static) {
     let mut builder = loom::model::Builder::new();
     builder.preemption_bound = Some(PREEMPTIONS);
     builder.check(run);
@@ -42,14 +42,6 @@ impl Word for Modelled {
         self.word.load(order)
     }
 
-    fn fetch_add(&self, value: u32, order: Ordering) -> u32 {
-        self.word.fetch_add(value, order)
-    }
-
-    fn fetch_and(&self, mask: u32, order: Ordering) -> u32 {
-        self.word.fetch_and(mask, order)
-    }
-
     fn exchange(&self, current: u32, new: u32, success: Ordering, failure: Ordering) -> bool {
         self.word
             .compare_exchange(current, new, success, failure)
@@ -67,9 +59,20 @@ impl Word for Modelled {
         Ended::Awake
     }
 
-    fn wake(&self) {
+    fn wake(&self) -> u32 {
         let _queue = self.queue.lock().unwrap();
         self.sleeper.notify_one();
+        1
+    }
+}
+
+impl Rung for Modelled {
+    fn fetch_add(&self, value: u32, order: Ordering) -> u32 {
+        self.word.fetch_add(value, order)
+    }
+
+    fn fetch_and(&self, mask: u32, order: Ordering) -> u32 {
+        self.word.fetch_and(mask, order)
     }
 
     fn set_reason(&self, reason: usize, order: Ordering) {

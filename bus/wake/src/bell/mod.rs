@@ -6,24 +6,35 @@
 //! sleeps. Observers have no seat and cost a ringer nothing. Nothing has to be connected: the next
 //! sample rings a waiter that starts late, restarts or replaces a killed one.
 //!
+//! An observer that wants to be woken is a watcher. Any number of watchers sleep on one word for
+//! their topic. The writer looks at that word when it has served everybody, and lets a thread that
+//! is not on the path wake them.
+//!
 //! | file | contents |
 //! |---|---|
 //! | `word` | the ring and sleep protocol; `interleaving_tests` checks it with three threads |
-//! | `futex` | the word as a futex |
+//! | `watch` | the same for watchers; `watch_interleaving_tests` checks it |
+//! | `futex` | both words as futexes |
 //! | `board` | the shared memory: who is rung for what, who may look without pause |
-//! | `segment`, `locks` | its file: joining, leaving, seats, and what killed processes leave |
+//! | `crier` | the thread that wakes watchers |
+//! | `mapping`, `segment`, `locks` | its file: joining, leaving, seats, and what killed processes leave |
 //! | `rhythm` | when it is worth looking without pause |
 //!
 //! **Invariant:** a ring is a hint, and so are its reasons (the topics for which it was). A waiter
 //! has a time-out and looks at everything now and then. Ringing and waiting do not allocate.
 
 mod board;
+mod crier;
 mod futex;
 #[cfg(test)]
 mod interleaving_tests;
 mod locks;
+mod mapping;
 mod rhythm;
 mod segment;
+mod watch;
+#[cfg(test)]
+mod watch_interleaving_tests;
 mod word;
 
 use core::time::Duration;
@@ -31,6 +42,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use lager_home::{Home, UnitName};
 use lager_sample::Part;
+use rustix::thread::futex::Wait;
 
 pub use board::SEATS_PER_PART;
 pub(crate) use rhythm::{Plan, Rhythm};
@@ -45,6 +57,11 @@ pub(crate) const INSIDE: usize = 0;
 /// and build. If two topics share a reason, a ring for one makes the waiter look at both.
 pub(crate) const fn reason(id: u32) -> usize {
     1 + id as usize % (board::REASONS - 1)
+}
+
+/// The word for watchers of the topic with the number `id`, the same in every process and build.
+const fn watched(id: u32) -> usize {
+    id as usize % board::WATCHED
 }
 
 /// A unit's board. The first port of this process that needs it opens it, the last one closes it.
@@ -239,5 +256,93 @@ impl SeatRinger {
     /// Rings.
     pub(crate) fn ring(&self) {
         word::ring(self.segment.seat(self.seat), INSIDE);
+    }
+}
+
+/// The ringing side for watchers of one topic.
+pub struct WatchRinger {
+    segment: Arc<Segment>,
+    word: usize,
+}
+
+impl WatchRinger {
+    /// A ringer for the watchers of the topic with the number `id`, present and future.
+    ///
+    /// # Errors
+    /// The board cannot be used.
+    pub fn to(board: &Board, id: u32) -> Result<Self, BoardFault> {
+        Ok(Self {
+            segment: board.open()?,
+            word: watched(id),
+        })
+    }
+
+    /// Lets all watchers be woken that sleep. Call it when the sample is in their queues. Makes one
+    /// system call at most, whatever the number of watchers, and none if nobody sleeps. The first
+    /// call that finds a sleeping watcher starts a thread, which wakes them.
+    #[inline]
+    pub fn ring(&self) {
+        self.segment.ring_watchers(self.word);
+    }
+}
+
+/// The watcher's side: the words of its topics. It stays in the thread that made it.
+pub struct Watch {
+    segment: Arc<Segment>,
+    /// Each word, and its value when the sleep was announced.
+    words: Vec<(usize, u32)>,
+    waits: Vec<Wait>,
+}
+
+impl Watch {
+    /// Watches nothing yet.
+    ///
+    /// # Errors
+    /// The board cannot be used.
+    pub fn on(board: &Board) -> Result<Self, BoardFault> {
+        Ok(Self {
+            segment: board.open()?,
+            words: Vec::new(),
+            waits: Vec::new(),
+        })
+    }
+
+    /// Also watches the topic with the number `id`.
+    pub fn add(&mut self, id: u32) {
+        let word = watched(id);
+        if self.words.iter().all(|(known, _)| *known != word) {
+            self.words.push((word, 0));
+            self.waits.reserve(self.words.len());
+        }
+    }
+
+    /// Announces a sleep. Look into the queues of all topics after this, and sleep only if nothing
+    /// is there.
+    pub fn announce(&mut self) {
+        for (word, announced) in &mut self.words {
+            *announced = watch::announce(self.segment.watched(*word));
+        }
+    }
+
+    /// Sleeps until a writer of one of the topics rings, at most `timeout`; true if a ring or a
+    /// signal ended the sleep. Does not sleep if there was a ring since the announcement.
+    pub fn sleep(&mut self, timeout: Duration) -> bool {
+        let segment = &self.segment;
+        let mut words = self
+            .words
+            .iter()
+            .map(|(word, announced)| (segment.watched(*word), *announced));
+        let ended = match words.len() {
+            0 => {
+                std::thread::sleep(timeout);
+                word::Ended::TimedOut
+            }
+            1 => {
+                let (word, announced) = words.next().expect("one");
+                watch::sleep(word, announced, timeout)
+            }
+            _ => futex::sleep_while_all(words, &mut self.waits, timeout),
+        };
+        ended == word::Ended::Awake
     }
 }

@@ -15,25 +15,24 @@
 //!
 //! The file is `bells` in the unit's folder ([`Home`](lager_home::Home)).
 
-#![allow(unsafe_code, reason = "a mapping is shared memory")]
-
 use core::ops::Deref;
-use core::ptr::NonNull;
 use core::time::Duration;
 use std::fs::{File, OpenOptions};
 use std::io::{Error, ErrorKind};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use lager_sample::Part;
 use rustix::fs::{FallocateFlags, fallocate};
-use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use rustix::thread::{MembarrierCommand, membarrier};
 
 use super::board::{Board, Layout, SEATS, SEATS_PER_PART};
+use super::crier::Crier;
 use super::locks::{Kind, is_held, try_lock, unlock};
+use super::mapping::Mapping;
+use super::watch;
 
 const DOOR: u64 = 0;
 const PRESENCE: u64 = 1;
@@ -69,7 +68,9 @@ pub(crate) struct Segment {
     board: Mapping,
     /// The seats whose locks this process holds, as bits. The kernel would grant these locks again,
     /// because the same open file already has them.
-    own: Mutex<u32>,
+    own: Mutex<u64>,
+    /// Wakes watchers for the writers of this process, once one is needed. `None`: it could not start.
+    crier: OnceLock<Option<Crier>>,
 }
 
 impl Deref for Segment {
@@ -142,6 +143,7 @@ impl Segment {
             path: path.to_owned(),
             board,
             own: Mutex::new(0),
+            crier: OnceLock::new(),
         }))
     }
 
@@ -165,7 +167,7 @@ impl Segment {
         self.sit(&mut own, part)
     }
 
-    fn sit(&self, own: &mut u32, part: Part) -> Result<usize, BoardFault> {
+    fn sit(&self, own: &mut u64, part: Part) -> Result<usize, BoardFault> {
         if self.seats_of(part).count_ones() as usize >= SEATS_PER_PART {
             return Err(BoardFault::NoSeat);
         }
@@ -198,7 +200,7 @@ impl Segment {
         self.sweep_but(*self.own())
     }
 
-    fn sweep_but(&self, own: u32) -> Result<(), BoardFault> {
+    fn sweep_but(&self, own: u64) -> Result<(), BoardFault> {
         let taken = self.taken() & !own;
         for seat in (0..SEATS).filter(|seat| taken & (1 << seat) != 0) {
             if try_lock(&self.file, byte(seat), Kind::Exclusive)? {
@@ -222,7 +224,30 @@ impl Segment {
             .collect()
     }
 
-    fn own(&self) -> MutexGuard<'_, u32> {
+    /// Lets the crier wake all who sleep on a word for watchers, if anybody does.
+    #[inline]
+    pub(crate) fn ring_watchers(&self, word: usize) {
+        if watch::is_awaited(self.watched(word)) {
+            self.call_crier(word);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn call_crier(&self, word: usize) {
+        let start = || match Crier::start(self.board.clone()) {
+            Ok(crier) => Some(crier),
+            Err(error) => {
+                tracing::warn!("watchers are not woken and only look now and then: {error}");
+                None
+            }
+        };
+        if let Some(crier) = self.crier.get_or_init(start) {
+            crier.ring(word);
+        }
+    }
+
+    fn own(&self) -> MutexGuard<'_, u64> {
         // The mutex guards one number, which is valid at every moment.
         self.own.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -247,54 +272,6 @@ impl Drop for Segment {
 
 fn byte(seat: usize) -> u64 {
     FIRST_SEAT + seat as u64
-}
-
-/// A board in this process's memory.
-struct Mapping {
-    board: NonNull<Board>,
-}
-
-// SAFETY: a board consists of atomics and stays mapped until the drop, in any thread.
-unsafe impl Send for Mapping {}
-// SAFETY: as above.
-unsafe impl Sync for Mapping {}
-
-impl Mapping {
-    fn of(file: &File) -> Result<Self, Error> {
-        // SAFETY: a fresh mapping at an address of the kernel's choice. The file has the board's
-        // size, and nobody ever makes it smaller.
-        let place = unsafe {
-            mmap(
-                core::ptr::null_mut(),
-                size_of::<Board>(),
-                ProtFlags::READ | ProtFlags::WRITE,
-                MapFlags::SHARED | MapFlags::POPULATE,
-                file,
-                0,
-            )?
-        };
-        Ok(Self {
-            board: NonNull::new(place.cast()).expect("the kernel maps nothing at 0 unasked"),
-        })
-    }
-}
-
-impl Deref for Mapping {
-    type Target = Board;
-
-    #[inline]
-    fn deref(&self) -> &Board {
-        // SAFETY: mapped with the size of a `Board` until the drop, page-aligned, and valid for
-        // every bit pattern. All references to it are shared, and writes go through atomics.
-        unsafe { self.board.as_ref() }
-    }
-}
-
-impl Drop for Mapping {
-    fn drop(&mut self) {
-        // SAFETY: `of` mapped it with this size, and nobody can refer to it any more.
-        let _ = unsafe { munmap(self.board.as_ptr().cast(), size_of::<Board>()) };
-    }
 }
 
 /// The lock that makes joining, leaving and taking a seat one step each.
@@ -342,6 +319,25 @@ mod tests {
         assert_eq!(segment.seats_of(BRIDGE), 0);
         assert_eq!(segment.seats_of(LOGIC), 1);
         assert!(segment.may_spin(1, 1), "the right to spin has come free");
+        drop(segment);
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_crier_is_started_by_the_first_watcher_that_sleeps() {
+        let path = PathBuf::from(format!("/dev/shm/lpcrier{}", std::process::id()));
+        let segment = Segment::join(&path).unwrap();
+        segment.ring_watchers(5);
+        assert!(segment.crier.get().is_none(), "nobody sleeps");
+        let announced = watch::announce(segment.watched(5));
+        segment.ring_watchers(6);
+        assert!(segment.crier.get().is_none(), "nobody sleeps there");
+        segment.ring_watchers(5);
+        assert!(segment.crier.get().is_some());
+        // Whether the cry was before this or comes now: it ends the sleep.
+        let minute = Duration::from_secs(60);
+        let ended = watch::sleep(segment.watched(5), announced, minute);
+        assert_eq!(ended, super::super::word::Ended::Awake);
         drop(segment);
         assert!(!path.exists());
     }

@@ -37,7 +37,7 @@ use core::time::Duration;
 pub(crate) const SLEEPING: u32 = 1;
 
 /// What one ring adds.
-const ONE: u32 = 2;
+pub(crate) const ONE: u32 = 2;
 
 /// Why a sleep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,17 +48,21 @@ pub(crate) enum Ended {
     TimedOut,
 }
 
-/// What the protocol needs of the machine: an atomic word, and sleeping on it as on a futex.
+/// What a protocol needs of the machine: an atomic word, and sleeping on it as on a futex.
 pub(crate) trait Word {
     fn load(&self, order: Ordering) -> u32;
-    fn fetch_add(&self, value: u32, order: Ordering) -> u32;
-    fn fetch_and(&self, mask: u32, order: Ordering) -> u32;
     /// Sets the word to `new` if it is `current`; returns whether it did.
     fn exchange(&self, current: u32, new: u32, success: Ordering, failure: Ordering) -> bool;
     /// Sleeps if the word is still `value`; comparing and going to sleep are one step.
     fn sleep_while(&self, value: u32, timeout: Duration) -> Ended;
-    /// Wakes the sleeper, if there is one.
-    fn wake(&self);
+    /// Wakes the sleeper, or all of them if there may be several; returns how many it has woken.
+    fn wake(&self) -> u32;
+}
+
+/// What a seat's word has besides.
+pub(crate) trait Rung: Word {
+    fn fetch_add(&self, value: u32, order: Ordering) -> u32;
+    fn fetch_and(&self, mask: u32, order: Ordering) -> u32;
     fn set_reason(&self, reason: usize, order: Ordering);
     /// Clears the reason; returns whether it was set.
     fn take_reason(&self, reason: usize, order: Ordering) -> bool;
@@ -66,14 +70,14 @@ pub(crate) trait Word {
 
 /// Rings for `reason`. A waiter that has noticed the ring, or has taken the reason, sees everything
 /// that was written before.
-pub(crate) fn ring(word: &impl Word, reason: usize) {
+pub(crate) fn ring(word: &impl Rung, reason: usize) {
     if count(word, reason) {
         word.wake();
     }
 }
 
 /// The first half of a ring; returns whether the second half (the wake) is needed.
-pub(crate) fn count(word: &impl Word, reason: usize) -> bool {
+pub(crate) fn count(word: &impl Rung, reason: usize) -> bool {
     // The reason has release ordering of its own: a waiter that another ring has woken may take the
     // reason before this ring's addition, and look because of it.
     leave(word, reason);
@@ -81,12 +85,12 @@ pub(crate) fn count(word: &impl Word, reason: usize) -> bool {
 }
 
 /// Leaves `reason` without ringing. The waiter finds it when it next wakes.
-pub(crate) fn leave(word: &impl Word, reason: usize) {
+pub(crate) fn leave(word: &impl Rung, reason: usize) {
     word.set_reason(reason, Ordering::Release);
 }
 
 /// Whether there was a ring for `reason`, or the reason was left, since the last call.
-pub(crate) fn rung_for(word: &impl Word, reason: usize) -> bool {
+pub(crate) fn rung_for(word: &impl Rung, reason: usize) -> bool {
     word.take_reason(reason, Ordering::Acquire)
 }
 
@@ -98,7 +102,7 @@ pub(crate) struct Sleeper {
 
 impl Sleeper {
     /// Begins to wait on a word on which nobody else waits. Earlier rings do not count.
-    pub(crate) fn new(word: &impl Word) -> Self {
+    pub(crate) fn new(word: &impl Rung) -> Self {
         // A waiter that was killed while it slept has left `S` set.
         let old = word.fetch_and(!SLEEPING, Ordering::Acquire);
         Self {
@@ -108,14 +112,14 @@ impl Sleeper {
 
     /// Whether it has been rung since the last call. Neither writes nor waits.
     #[inline]
-    pub(crate) fn rung(&self, word: &impl Word) -> bool {
+    pub(crate) fn rung(&self, word: &impl Rung) -> bool {
         let now = word.load(Ordering::Acquire);
         now != self.seen.replace(now)
     }
 
     /// Sleeps until a ring, at most `timeout`; true if a ring or a signal ended the sleep. A ringer
     /// whose wake comes late, after its ring was noticed, may end a sleep too.
-    pub(crate) fn sleep(&self, word: &impl Word, timeout: Duration) -> bool {
+    pub(crate) fn sleep(&self, word: &impl Rung, timeout: Duration) -> bool {
         let seen = self.seen.get();
         let asleep = seen | SLEEPING;
         if !word.exchange(seen, asleep, Ordering::Relaxed, Ordering::Relaxed) {

@@ -113,8 +113,9 @@ pub enum TopicCommand {
     },
     /// Measure how long samples take from their source to a reader, once a second
     #[command(
-        after_help = "Nobody wakes this tool; it looks every millisecond. `own wait` is the time for which samples
-waited for that look; it is not part of `publish -> receive`."
+        after_help = "A writer wakes this tool when everybody else has the sample. `own wait` is the time from the
+publication until the tool looks; it is not part of `publish -> receive`. Of a robot on another
+computer the tool looks every millisecond."
     )]
     Delay {
         /// What and how long
