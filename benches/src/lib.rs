@@ -14,10 +14,10 @@
 mod baseline;
 pub mod chip;
 pub mod compare;
-pub mod conditions;
 pub mod error;
 mod group;
 mod hop;
+mod load;
 pub mod machine;
 mod pair;
 mod path;
@@ -32,13 +32,15 @@ pub mod slow;
 pub mod stats;
 pub mod steps;
 pub mod times;
+pub mod topic;
 
 pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session};
 pub use lager_rig::{Domain, heed_interrupts, interrupted};
 pub use path::may_have_real_time;
-pub use report::{Mode, Options, Pace, Ratio, Regime, Report, Row};
+pub use report::{Load, Mode, Options, Pace, Ratio, Regime, Report, Row};
 pub use rounds::{Rate, Run, Taken};
+pub use sample::SIZES;
 pub use scenario::Scenario;
 pub use stats::{Distribution, Quantiles, median};
 
@@ -51,9 +53,11 @@ pub fn run_if_asked() {
     lager_rig::process::run_if_asked(&[
         machine::PROCESSES,
         hop::PROCESSES,
+        pair::observer::PROCESSES,
         publish::PROCESSES,
         path::PROCESSES,
         path::FLOOR_PROCESSES,
+        load::PROCESSES,
     ]);
 }
 

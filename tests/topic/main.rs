@@ -1,6 +1,7 @@
 //! Tests of `lager topic` and `lager top` on a user's own topics and beside a robot: what they
 //! measure, what they may publish, and that they show at once a topic that loses samples.
 
+mod bench;
 mod screen;
 
 use std::io::Write;
