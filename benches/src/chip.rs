@@ -12,8 +12,8 @@ use std::process::Command;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::conditions::Machine;
 use crate::error::BenchError;
+use lager_machine::Machine;
 
 /// The baud rates for which there are images: the default one and the original boards'.
 pub const BAUDS: [u32; 2] = [500_000, 9_600];

@@ -265,10 +265,10 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conditions::Machine;
     use crate::report::{Mode, Regime};
     use crate::rounds::Rate;
     use crate::stats::Distribution;
+    use lager_machine::Machine;
 
     /// A measurement with these rows: name, and the median of each run in us.
     fn saved(rows: &[(&str, &[u64])]) -> Saved {

@@ -58,6 +58,24 @@ pub enum BenchError {
         "the other process of the measurement was not ready within {0:?}; the machine is overloaded, or it has ended: look at the messages above and start again"
     )]
     Alone(Duration),
+    /// No process has a topic of that name open, of that robot.
+    #[error(
+        "`{1}` has no topic `{0}` on this bus; `lager topic list` shows those that are open, and `--bus` and `--name` choose another bus and robot"
+    )]
+    NoTopic(String, String),
+    /// Nobody is known to be woken by that topic.
+    #[error(
+        "whom `{0}` wakes is not in the robot's table, so only an observer can measure it; leave out --wait"
+    )]
+    NotWoken(String),
+    /// The topic had no sample for that time.
+    #[error("no sample of `{0}` came within {1:?}; `lager topic info {0}` shows who writes it")]
+    Quiet(String, Duration),
+    /// A program that makes the load or measures the floor does not exist, of that package.
+    #[error(
+        "`--load` needs the program `{0}`, which is not there; `apt-get install {1}` installs it"
+    )]
+    NoProgram(&'static str, &'static str),
     /// The emulator or an image does not exist.
     #[error("there is no {0}; build the boards' images and the emulator with `.ci/firmware`")]
     NotBuilt(PathBuf),

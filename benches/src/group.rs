@@ -192,6 +192,7 @@ fn rows(what: &str, regime: Regime, entries: &[Entry], runs: Vec<Vec<Run>>) -> V
             spread: Spread::over(&runs),
             rate: Rate::over(runs.iter().flat_map(|run| &run.rates)),
             disordered: runs.iter().map(|run| run.disordered).sum(),
+            lost: runs.iter().map(|run| run.lost).sum(),
             ratios,
             runs,
             ..Row::new(what, entry.label, entry.mode, regime, times)

@@ -14,9 +14,10 @@
 //!
 //! Rows called `hop` are half of the round trip, as fast as samples come back. `hop@full-rate` is
 //! one way at the same rate, `hop@10kHz` one way with a sample due every 100 µs. With `--rate`, every
-//! mode is measured one way at that rate.
+//! mode is measured one way at that rate. With `--size` or `--observers` the rows are those of [`sized`].
 
 mod ends;
+mod sized;
 
 use std::error::Error;
 use std::os::fd::OwnedFd;
@@ -31,9 +32,9 @@ use crate::baseline::stream;
 use crate::error::BenchError;
 use crate::group::{Entry, Group};
 use crate::machine::cores_for;
-use crate::pair;
+use crate::pair::{self, Noted, Side};
 use crate::report::{Mode, Options, Pace, Ratio, Regime, Row};
-use ends::{HEADER, Job, ROWS};
+use ends::{HEADER, Job, One};
 
 const SENDER: &str = "sender of the hop";
 const RECEIVER: &str = "receiver of the hop";
@@ -41,7 +42,16 @@ const RECEIVER: &str = "receiver of the hop";
 pub(crate) const PROCESSES: &[(&str, Main)] = &[(SENDER, exchange), (RECEIVER, exchange)];
 
 fn exchange(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    pair::measure(parent, ends::round)
+    pair::measure(parent, round)
+}
+
+/// One round in one of the two processes.
+fn round(side: &Side, round: &ends::Round) -> Result<Noted, BenchError> {
+    let one = One { side, round };
+    match round.what.words {
+        None => ends::round(&one),
+        Some(words) => sized::round(&one, words),
+    }
 }
 
 /// The groups of one regime: the rows of one mode, and their baselines.
@@ -64,24 +74,43 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
             .map(|mode| (*mode, Some(pace), samples))
             .collect();
     }
+    let words = options.words();
     groups
         .into_iter()
         .filter(|(mode, ..)| options.modes.contains(mode))
         // On a shared core, a process that looks without pause keeps the sender from sending.
         .filter(|(mode, ..)| regime != Regime::SameCore || *mode == Mode::Block)
         .map(|(mode, pace, samples)| {
-            let what = pace.map_or_else(|| "hop".to_owned(), |pace| format!("hop@{pace}"));
             let (gap, cores) = (pace.map(Pace::gap), options.cores);
             let takes_part = |entry: &Entry| {
                 entry.mode == mode || (mode == Mode::Adaptive && entry.label == HEADER)
             };
-            let numbered = ROWS.iter().enumerate();
+            let all: Vec<Entry> = match words {
+                None => ends::ROWS.iter().map(|(entry, _)| *entry).collect(),
+                Some(_) => sized::ROWS.iter().map(|(entry, _)| *entry).collect(),
+            };
+            let job = |(row, entry): (usize, Entry)| {
+                let watched = entry.label == sized::OBSERVED;
+                let observers = options.observers.filter(|_| watched).unwrap_or(0);
+                let job = Job {
+                    row,
+                    gap,
+                    words,
+                    observers,
+                };
+                (entry, job)
+            };
+            let numbered = all.into_iter().enumerate();
             let rows: Vec<_> = numbered
-                .filter(|(_, (entry, _))| takes_part(entry))
-                .map(|(row, (entry, _))| (*entry, Job { row, gap }))
+                .filter(|(_, entry)| takes_part(entry))
+                .filter(|(_, entry)| entry.label != sized::OBSERVED || options.observers.is_some())
+                .map(job)
                 .collect();
+            let samples = words.map_or(samples, |words| {
+                samples.map(|usual| sized::samples(usual, 8 * words))
+            });
             Group {
-                what,
+                what: what(pace, options),
                 regime,
                 entries: rows.iter().map(|(entry, _)| *entry).collect(),
                 rounds: pair::ROUNDS,
@@ -101,6 +130,25 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
             }
         })
         .collect()
+}
+
+/// The name of a group: `hop`, `hop@10kHz`, `hop@1MiB,10kHz,8 observers`, …
+fn what(pace: Option<Pace>, options: &Options) -> String {
+    let size = options.size.map(|bytes| match bytes {
+        ..1_024 => format!("{bytes}B"),
+        1_024..1_048_576 => format!("{}KiB", bytes >> 10),
+        _ => format!("{}MiB", bytes >> 20),
+    });
+    let pace = pace.map(|pace| pace.to_string());
+    let observers = options.observers.map(|many| match many {
+        1 => "1 observer".to_owned(),
+        many => format!("{many} observers"),
+    });
+    let parts: Vec<_> = [size, pace, observers].into_iter().flatten().collect();
+    match &*parts {
+        [] => "hop".to_owned(),
+        parts => format!("hop@{}", parts.join(",")),
+    }
 }
 
 /// The descriptors of the kernel's carriers, in the order of the constants in `ends`.

@@ -14,10 +14,10 @@
 mod baseline;
 pub mod chip;
 pub mod compare;
-pub mod conditions;
 pub mod error;
 mod group;
 mod hop;
+mod load;
 pub mod machine;
 mod pair;
 mod path;
@@ -32,14 +32,16 @@ pub mod slow;
 pub mod stats;
 pub mod steps;
 pub mod times;
+pub mod topic;
 mod watch;
 
 pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session};
 pub use lager_rig::{Domain, heed_interrupts, interrupted};
 pub use path::may_have_real_time;
-pub use report::{Mode, Options, Pace, Ratio, Regime, Report, Row};
+pub use report::{Load, Mode, Options, Pace, Ratio, Regime, Report, Row};
 pub use rounds::{Rate, Run, Taken};
+pub use sample::SIZES;
 pub use scenario::Scenario;
 pub use stats::{Distribution, Quantiles, median};
 
@@ -52,10 +54,12 @@ pub fn run_if_asked() {
     lager_rig::process::run_if_asked(&[
         machine::PROCESSES,
         hop::PROCESSES,
+        pair::observer::PROCESSES,
         publish::PROCESSES,
         watch::PROCESSES,
         path::PROCESSES,
         path::FLOOR_PROCESSES,
+        load::PROCESSES,
     ]);
 }
 

@@ -7,9 +7,9 @@ use lager_rig::process::Main;
 use lager_rig::schedule::{pin, schedule, usable_cores};
 use lager_rig::{Parent, Process, Refused};
 
-use crate::conditions::Cores;
 use crate::error::BenchError;
 use crate::report::Regime;
+use lager_machine::Cores;
 
 const SPINNER: &str = "idle spinner";
 

@@ -1,5 +1,5 @@
-//! Two processes that measure rounds with each other, each on its core. `hop`, `ring-64` and
-//! `publish` use them.
+//! Two processes that measure rounds with each other, each on its core, and others that watch
+//! ([`observer`]). `hop`, `ring-64` and `publish` use them.
 //!
 //! ```text
 //!   session ── Round ──> first:  opens its ports ─┐  barrier ─ samples ─ barrier ─> times, in ns
@@ -8,6 +8,8 @@
 //!
 //! Each round has new ports, so that their places in memory differ from round to round. The first
 //! samples are not timed: meanwhile publisher and subscriber find each other, and caches fill.
+
+pub(crate) mod observer;
 
 use core::time::Duration;
 use std::error::Error;
@@ -23,10 +25,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::baseline::LIMIT;
 use crate::baseline::memory::Lanes;
-use crate::conditions::Cores;
 use crate::error::{BenchError, Fault, no_bus};
 use crate::group::{Entry, Opened, Session};
 use crate::rounds::Taken;
+use lager_machine::Cores;
 
 /// Rounds of each row in a run: with `--quick`, and without.
 pub(crate) const ROUNDS: [usize; 2] = [2, 4];
@@ -118,13 +120,23 @@ impl From<Vec<u64>> for Noted {
     }
 }
 
+/// What a round measures.
+pub(crate) trait Work: Serialize {
+    /// The processes that only watch meanwhile: how many, and the size of a sample in words.
+    fn observers(&self) -> (usize, usize) {
+        (0, 0)
+    }
+}
+
 /// Both processes, and the measurement of each row. The fields are dropped in this order, so no
 /// process is on the bus when it is removed.
 struct Pair<X> {
     first: Process,
     second: Process,
+    /// Those that only watch, if a row has any; each sleeps while it is not told to watch.
+    observers: Vec<Process>,
     _memory: Shared<Memory>,
-    _domain: Domain,
+    domain: Domain,
     rows: Vec<(Entry, X)>,
     /// The time from one sample to the next that is due.
     gap: Duration,
@@ -133,7 +145,7 @@ struct Pair<X> {
 
 /// Starts both processes on their cores, which inherit `lines`, to measure `rows`, whose samples are
 /// due `gap` apart.
-pub(crate) fn open<X: Serialize + 'static>(
+pub(crate) fn open<X: Work + 'static>(
     cores: Cores,
     gap: Duration,
     [first, second]: [&str; 2],
@@ -157,15 +169,28 @@ pub(crate) fn open<X: Serialize + 'static>(
     Ok(Box::new(Pair {
         first: start(first, true, cores.0)?,
         second: start(second, false, cores.1)?,
+        observers: Vec::new(),
         _memory: memory,
-        _domain: domain,
+        domain,
         rows,
         gap,
         rounds: 0,
     }))
 }
 
-impl<X: Serialize> Session for Pair<X> {
+impl<X> Pair<X> {
+    /// Starts observers until there are so many.
+    fn start_observers(&mut self, many: usize) -> Result<(), BenchError> {
+        while self.observers.len() < many {
+            let mut observer = Process::start(observer::NAME)?;
+            let () = observer.ask(&self.domain.folder())?;
+            self.observers.push(observer);
+        }
+        Ok(())
+    }
+}
+
+impl<X: Work> Session for Pair<X> {
     /// The first process's times. If the second process notes times, both note readings of the
     /// clock, and the result is the time from the first's to the second's.
     fn round(&mut self, index: usize, samples: usize) -> Result<Taken, BenchError> {
@@ -173,6 +198,11 @@ impl<X: Serialize> Session for Pair<X> {
         // one the parent waits ten times as long for a sample as the slowest machine should need.
         const SAMPLE: Duration = Duration::from_millis(1);
         self.rounds += 1;
+        let (watching, words) = self.rows[index].1.observers();
+        self.start_observers(watching)?;
+        for observer in &mut self.observers[..watching] {
+            let () = observer.ask(&words)?;
+        }
         let (entry, what) = &self.rows[index];
         let samples = u32::try_from(samples).unwrap_or(u32::MAX);
         let round = Round {
@@ -187,6 +217,9 @@ impl<X: Serialize> Session for Pair<X> {
         self.second.tell(&round);
         let (sent, received): (Noted, Noted) =
             Process::both(&mut self.first, &mut self.second, limit)?;
+        for observer in &mut self.observers[..watching] {
+            let () = observer.ask(&())?;
+        }
         let mut taken = Taken::default();
         if received.times.is_empty() {
             taken.service = sent.times;

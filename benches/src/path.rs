@@ -15,6 +15,7 @@
 //! | `path` | `lager/block` | `floor` |
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
 //! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
+//! | | `lager/observed`, with `--observers` in place of these two | `lager/alone` |
 //! | `path@remote` | `lager/8 listeners` | `lager/alone`; all SCHED_FIFO; only with the feature `zenoh` |
 //! | `path@watched` | `lager/8 watchers`, `lager/64 watchers` | `lager/alone`; all SCHED_FIFO |
 //! | `path-overtaken` | frames of each `lager` row whose command was overtaken | |
@@ -39,7 +40,6 @@ mod turn;
 use lager_rig::Refused;
 use lager_rig::schedule::{Bound, NoRealTime, Placement, RealTime};
 
-use crate::conditions::Cores;
 use crate::error::BenchError;
 use crate::group::{Entry, Group, Session};
 use crate::machine::cores_for;
@@ -47,6 +47,7 @@ use crate::report::{Mode, Options, Regime, Row};
 use crate::rounds::Taken;
 use crate::stats::Distribution;
 use floor::Floor;
+use lager_machine::Cores;
 use robot::{Places, Robot};
 use turn::{Chain, TURN, turn};
 
@@ -61,7 +62,7 @@ const SERVICES: u8 = 40;
 const BOARDS: u8 = 50;
 
 /// The rows, each with those who are beside the path.
-type Rows = [(Entry, Beside); 3];
+type Rows = Vec<(Entry, Beside)>;
 
 /// Who else gets the samples of a robot, each in a process of its own.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +79,7 @@ enum Beside {
 }
 
 /// The rows without observers.
-static ALONE: Rows = [
+const ALONE: [(Entry, Beside); 3] = [
     (
         Entry::new("lager/block", Mode::Block, &["floor"]),
         Beside::Nobody,
@@ -90,59 +91,49 @@ static ALONE: Rows = [
     ),
 ];
 
-/// The rows with and without observers, in real time.
-static OBSERVED: Rows = [
-    (Entry::new("lager/alone", Mode::Block, &[]), Beside::Nobody),
-    (
-        Entry::new("lager/8 observers", Mode::Block, &["lager/alone"]),
-        Beside::Observers(8),
-    ),
-    (
-        Entry::new("lager/64 observers", Mode::Block, &["lager/alone"]),
-        Beside::Observers(64),
-    ),
-];
+/// A row in real time with nobody beside it, and those that are compared with it.
+fn beside_alone(others: &[(&'static str, Beside)]) -> Rows {
+    let alone = ("lager/alone", Beside::Nobody);
+    let rows = [alone].into_iter().chain(others.iter().copied());
+    rows.map(|(label, beside)| {
+        let against: &[&str] = match beside {
+            Beside::Nobody => &[],
+            _ => &["lager/alone"],
+        };
+        (Entry::new(label, Mode::Block, against), beside)
+    })
+    .collect()
+}
 
-/// The rows with and without watchers, in real time.
-static WATCHED: Rows = [
-    (Entry::new("lager/alone", Mode::Block, &[]), Beside::Nobody),
-    (
-        Entry::new("lager/8 watchers", Mode::Block, &["lager/alone"]),
-        Beside::Watchers(8),
-    ),
-    (
-        Entry::new("lager/64 watchers", Mode::Block, &["lager/alone"]),
-        Beside::Watchers(64),
-    ),
-];
-
-/// The rows with and without listeners on other computers, in real time.
-#[cfg(feature = "zenoh")]
-static REMOTE: [(Entry, Beside); 2] = [
-    (Entry::new("lager/alone", Mode::Block, &[]), Beside::Nobody),
-    (
-        Entry::new("lager/8 listeners", Mode::Block, &["lager/alone"]),
-        Beside::Listeners(8),
-    ),
+/// The observers of a row each, unless others are asked for.
+const OBSERVED: [(&str, Beside); 2] = [
+    ("lager/8 observers", Beside::Observers(8)),
+    ("lager/64 observers", Beside::Observers(64)),
 ];
 
 /// The groups of one regime. No row spins: bridge and logic would use two cores, and the boards
 /// need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    let group = |what: &str, rows: &'static [(Entry, Beside)], observed| {
-        group(what, regime, options, rows, observed)
-    };
+    let group = |what: &str, rows: Rows, observed| group(what, regime, options, rows, observed);
     let wants = |mode| options.modes.contains(&mode);
     // On one core, an adaptive service would spin on the core that the others need.
     let adapts = wants(Mode::Adaptive) && regime != Regime::SameCore;
     let mut groups = Vec::new();
     if adapts || wants(Mode::Block) {
-        groups.push(group("path", &ALONE[..if adapts { 3 } else { 2 }], false));
+        let rows = ALONE[..if adapts { 3 } else { 2 }].to_vec();
+        groups.push(group("path", rows, false));
     }
     if wants(Mode::Block) && regime != Regime::SameCore {
-        groups.push(group("path@observed", &OBSERVED, true));
+        let observed = match options.observers {
+            None => beside_alone(&OBSERVED),
+            Some(many) => beside_alone(&[("lager/observed", Beside::Observers(many))]),
+        };
+        groups.push(group("path@observed", observed, true));
         #[cfg(feature = "zenoh")]
-        groups.push(group("path@remote", &REMOTE, true));
+        {
+            let remote = beside_alone(&[("lager/8 listeners", Beside::Listeners(8))]);
+            groups.push(group("path@remote", remote, true));
+        }
     }
     groups
 }
@@ -150,14 +141,18 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
 /// The group with watchers, which belongs to no limit.
 pub(crate) fn watched(regime: Regime, options: &Options) -> Option<Group> {
     let wanted = options.modes.contains(&Mode::Block) && regime != Regime::SameCore;
-    wanted.then(|| group("path@watched", regime, options, &WATCHED, true))
+    let rows = beside_alone(&[
+        ("lager/8 watchers", Beside::Watchers(8)),
+        ("lager/64 watchers", Beside::Watchers(64)),
+    ]);
+    wanted.then(|| group("path@watched", regime, options, rows, true))
 }
 
 fn group(
     what: &str,
     regime: Regime,
     options: &Options,
-    rows: &'static [(Entry, Beside)],
+    rows: Rows,
     observed: bool,
 ) -> Group {
     let cores = options.cores;
@@ -171,7 +166,7 @@ fn group(
             Ok(Box::new(Chains::start(
                 cores_for(regime, cores)?,
                 regime,
-                rows,
+                &rows,
                 observed,
             )?))
         }),

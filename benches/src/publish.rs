@@ -32,12 +32,12 @@ use lager_rig::process::Main;
 use lager_sample::Topic;
 use lager_topics::SensorLine;
 
-use crate::conditions::Cores;
 use crate::group::{Entry, Group};
 use crate::machine::cores_for;
 use crate::pair;
 use crate::report::{Mode, Options, Regime};
 use ends::{Job, KIB_64, MIB_1, SMALL};
+use lager_machine::Cores;
 
 const WRITER: &str = "writer";
 const READERS: &str = "readers";

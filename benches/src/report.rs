@@ -8,12 +8,15 @@ use core::str::FromStr;
 use core::time::Duration;
 
 use clap::ValueEnum;
+use lager_sample::Topic as _;
+use lager_topics::SensorLine;
 use lager_wake::Policy;
 use serde::{Deserialize, Serialize};
 
-use crate::conditions::{Conditions, Cores};
 use crate::rounds::{Rate, Run, Spread};
+use crate::sample::SIZE;
 use crate::stats::Quantiles;
+use lager_machine::{Conditions, Cores};
 
 /// How the receiver waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
@@ -25,6 +28,8 @@ pub enum Mode {
     Adaptive,
     /// It sleeps until it is woken.
     Block,
+    /// It looks every millisecond, as who only watches (`topic`).
+    Poll,
 }
 
 /// How the two processes share the processor.
@@ -37,6 +42,20 @@ pub enum Regime {
     SameCore,
     /// A core each, and a process that runs only when nothing else does keeps it from halting.
     NoHalt,
+}
+
+/// What else the machine does meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Load {
+    /// A process for each core that computes.
+    Cpu,
+    /// A process for each core that copies memory, and one that takes and gives it back.
+    Memory,
+    /// Two processes that write files and wait until the disk has them.
+    Io,
+    /// Timer interrupts: 20 000 a second.
+    Irq,
 }
 
 /// Shows a value by its name on the command line, in the limits and in JSON.
@@ -52,7 +71,7 @@ macro_rules! shown_by_name {
 }
 pub(crate) use shown_by_name;
 
-shown_by_name!(Mode, Regime);
+shown_by_name!(Mode, Regime, Load);
 
 impl Mode {
     /// The policy for a waiter of the typed ports.
@@ -60,7 +79,7 @@ impl Mode {
         match self {
             Self::Spin => Policy::Spin,
             Self::Adaptive => Policy::ADAPTIVE,
-            Self::Block => Policy::Block,
+            Self::Block | Self::Poll => Policy::Block,
         }
     }
 }
@@ -124,10 +143,27 @@ pub struct Options {
     pub cores: Option<Cores>,
     /// How often a hop is due, if not as its groups have it.
     pub pace: Option<Pace>,
+    /// The size of a hop's sample in bytes, if not 64: one of [`crate::SIZES`].
+    pub size: Option<usize>,
+    /// What else the machine does meanwhile.
+    pub load: Option<Load>,
+    /// A row beside so many observers, at most [`Options::OBSERVERS`].
+    pub observers: Option<usize>,
     /// The modes to measure.
     pub modes: Vec<Mode>,
     /// The regimes to measure.
     pub regimes: Vec<Regime>,
+}
+
+impl Options {
+    /// The places for observers of a topic of a measurement.
+    pub const OBSERVERS: usize = SensorLine::QOS.observers;
+
+    /// The size of a hop's sample in words, if its rows are those of any size.
+    pub(crate) fn words(&self) -> Option<usize> {
+        let asked = self.size.is_some() || self.observers.is_some();
+        asked.then(|| self.size.unwrap_or(SIZE) / 8)
+    }
 }
 
 impl Default for Options {
@@ -139,6 +175,9 @@ impl Default for Options {
             samples: None,
             cores: None,
             pace: None,
+            size: None,
+            load: None,
+            observers: None,
             modes: Mode::value_variants().to_vec(),
             regimes: Regime::value_variants().to_vec(),
         }
@@ -190,6 +229,9 @@ pub struct Row {
     /// Samples that came before they were sent, by the clock. They are in no percentile.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub disordered: u64,
+    /// Samples that were overwritten before their reader had them.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lost: u64,
     /// The ratios to other rows, the most important first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ratios: Vec<Ratio>,
@@ -227,6 +269,7 @@ impl Row {
             spread: None,
             rate: None,
             disordered: 0,
+            lost: 0,
             ratios: Vec::new(),
             cpu_percent: None,
             runs: Vec::new(),
@@ -309,6 +352,12 @@ impl Row {
             say(format!(
                 "overload: {reached:.0} of {asked:.0} samples a second were sent, so these times \
                  are those of a backlog"
+            ))?;
+        }
+        if self.lost > 0 {
+            let many = self.lost;
+            say(format!(
+                "lost: {many} samples were overwritten before they were received"
             ))?;
         }
         if self.disordered > 0 {
@@ -429,6 +478,7 @@ mod tests {
             reached_hz: 5_000.0,
         });
         report.rows[0].disordered = 1;
+        report.rows[0].lost = 2;
         let table = report.to_string();
         for cell in [
             " 10.0 us 10.0 us 10.1 us 1.23 ms       -       -  1.23 s",
@@ -437,6 +487,7 @@ mod tests {
             "from its sending",
             "overload: 5000 of 10000",
             "clock disorder: 1",
+            "lost: 2",
             "-  fewer than ten samples",
         ] {
             assert!(table.contains(cell), "{cell}: {table}");

@@ -14,6 +14,8 @@ pub struct Taken {
     pub response: Vec<u64>,
     /// Samples that came before they were sent, by the clock. They are in neither.
     pub disordered: u64,
+    /// Samples that were overwritten before their reader had them.
+    pub lost: u64,
     /// Samples a second: planned and sent. `None` if they are sent as fast as they come back.
     pub rate: Option<Rate>,
 }
@@ -87,6 +89,9 @@ pub struct Run {
     /// Samples that came before they were sent, by the clock.
     #[serde(default)]
     pub disordered: u64,
+    /// Samples that were overwritten before their reader had them.
+    #[serde(default)]
+    pub lost: u64,
     /// The rate of each round.
     #[serde(default)]
     pub rates: Vec<Rate>,
@@ -104,6 +109,7 @@ impl Run {
         self.service.extend(taken.service);
         self.response.extend(taken.response);
         self.disordered += taken.disordered;
+        self.lost += taken.lost;
         self.rates.extend(taken.rate);
     }
 

@@ -3,7 +3,7 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 use lager_ports::Subscriber;
-use lager_sample::{Field, FieldInfo, Make, Payload, Qos, Schema, StructInfo, Topic};
+use lager_sample::{Field, FieldInfo, LARGEST_COPY, Make, Payload, Qos, Schema, StructInfo, Topic};
 use lager_topics::{Role, SensorLine};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +18,30 @@ pub(crate) struct Block<const WORDS: usize> {
     #[serde(with = "lager_sample::list")]
     pub(crate) words: [u64; WORDS],
 }
+
+/// Calls a function for a sample of so many words, one of [`SIZES`].
+macro_rules! for_words {
+    ($words:expr, $function:ident($($argument:expr),*)) => {
+        match $words {
+            1 => $function::<1>($($argument),*),
+            2 => $function::<2>($($argument),*),
+            8 => $function::<8>($($argument),*),
+            32 => $function::<32>($($argument),*),
+            128 => $function::<128>($($argument),*),
+            512 => $function::<512>($($argument),*),
+            2_048 => $function::<2_048>($($argument),*),
+            8_192 => $function::<8_192>($($argument),*),
+            32_768 => $function::<32_768>($($argument),*),
+            _ => $function::<131_072>($($argument),*),
+        }
+    };
+}
+pub(crate) use for_words;
+
+/// The sizes of a sample that a hop can have, in bytes. Each is a type of its own.
+pub const SIZES: [usize; 10] = [
+    8, 16, 64, 256, 1_024, 4_096, 16_384, 65_536, 262_144, 1_048_576,
+];
 
 /// A payload of 64 bytes.
 pub(crate) type Sample = Block<8>;
@@ -36,6 +60,22 @@ impl<const WORDS: usize> Block<WORDS> {
     /// The block's number, unique within a measurement.
     pub(crate) const fn number(&self) -> u64 {
         self.words[0]
+    }
+
+    /// Gives it another number in its first and last word, without a look at those between.
+    pub(crate) const fn mark(&mut self, number: u64) {
+        self.words[0] = number;
+        self.words[WORDS - 1] = number ^ (WORDS as u64 - 1);
+    }
+
+    /// The number, if first and last word agree on it.
+    pub(crate) const fn marked(&self) -> Option<u64> {
+        let last = self.words[WORDS - 1] ^ (WORDS as u64 - 1);
+        if last == self.words[0] {
+            Some(last)
+        } else {
+            None
+        }
     }
 
     /// Whether every word is the one that [`Block::new`] wrote.
@@ -82,26 +122,39 @@ impl<const WORDS: usize> Schema for Block<WORDS> {
 
 impl<const WORDS: usize> Payload for Block<WORDS> {}
 
-/// From the sender to the receiver; as wide and deep as `sensor/line`.
-pub(crate) struct Ping;
+/// The queue for blocks of so many words. Small ones have `sensor/line`'s depth. Large ones have depth
+/// 1, because a publisher keeps memory for every sample that could lie in a subscriber's queue.
+pub(crate) const fn depth(words: usize) -> usize {
+    match words {
+        ..=512 => SensorLine::QOS.buffer,
+        _ => 1,
+    }
+}
 
-impl Topic for Ping {
+/// From the sender to the receiver; as wide as `sensor/line`.
+pub(crate) struct Ping<const WORDS: usize = 8>;
+
+impl<const WORDS: usize> Topic for Ping<WORDS> {
     const NAME: &'static str = "bench/ping";
-    type Payload = Sample;
+    type Payload = Block<WORDS>;
     const QOS: Qos = Qos {
+        buffer: depth(WORDS),
+        copied: 8 * WORDS <= LARGEST_COPY,
         actors: &[RECEIVER.part()],
         ..SensorLine::QOS
     };
     const SUMMARY: &'static str = "From the sender of a measurement to the receiver.";
 }
 
-/// From the receiver back to the sender; as wide and deep as `sensor/line`.
-pub(crate) struct Pong;
+/// From the receiver back to the sender; as wide as `sensor/line`.
+pub(crate) struct Pong<const WORDS: usize = 8>;
 
-impl Topic for Pong {
+impl<const WORDS: usize> Topic for Pong<WORDS> {
     const NAME: &'static str = "bench/pong";
-    type Payload = Sample;
+    type Payload = Block<WORDS>;
     const QOS: Qos = Qos {
+        buffer: depth(WORDS),
+        copied: 8 * WORDS <= LARGEST_COPY,
         actors: &[SENDER.part()],
         ..SensorLine::QOS
     };
@@ -133,6 +186,21 @@ mod tests {
         assert!(sample.is_whole());
         sample.words[5] ^= 1 << 40;
         assert!(!sample.is_whole());
+    }
+
+    #[test]
+    fn a_block_of_any_size_is_marked_at_both_ends() {
+        fn check<const WORDS: usize>() {
+            let mut block = Block::<WORDS>::new(1 << 40);
+            assert_eq!(block.marked(), Some(1 << 40));
+            block.mark(7);
+            assert_eq!((block.number(), block.marked()), (7, Some(7)));
+            block.words[WORDS - 1] ^= 1 << 9;
+            assert_eq!(block.marked(), (WORDS == 1).then_some(7 ^ (1 << 9)));
+        }
+        check::<1>();
+        check::<2>();
+        check::<512>();
     }
 
     #[test]

@@ -11,10 +11,10 @@ use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 use serde::{Deserialize, Serialize};
 
-use crate::conditions::{Conditions, Machine};
 use crate::report::{Report, Row};
 use crate::rounds::Run;
 use crate::stats::Distribution;
+use lager_machine::{Conditions, Machine};
 
 /// The number of this layout; a later one that reads differently has another.
 const LAYOUT: u32 = 1;

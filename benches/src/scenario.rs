@@ -2,12 +2,13 @@
 
 use clap::ValueEnum;
 
-use crate::conditions::{Machine, Observed};
 use crate::error::BenchError;
 use crate::group::Group;
+use crate::load::Loaded;
 use crate::machine;
 use crate::report::{Options, Report, shown_by_name};
 use crate::{hop, path, publish, watch};
+use lager_machine::{Machine, Observed};
 
 /// A timed measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -28,8 +29,9 @@ impl Scenario {
     pub fn groups(self, options: &Options) -> Vec<Group> {
         let of_regime = |regime: &_| match self {
             Self::Hop => {
-                // It has no pace of its own.
-                let ring = publish::ring(*regime, options).filter(|_| options.pace.is_none());
+                // It has neither a pace nor a size of its own.
+                let ring = publish::ring(*regime, options)
+                    .filter(|_| options.pace.is_none() && options.words().is_none());
                 hop::groups(*regime, options)
                     .into_iter()
                     .chain(ring)
@@ -56,6 +58,12 @@ impl Scenario {
             .map(|regime| machine::cores_for(*regime, options.cores))
             .transpose()?;
         let observed = Observed::begin(cores);
+        let place = options.regimes.first().copied().zip(cores);
+        let loaded = options
+            .load
+            .zip(place)
+            .map(|(load, (regime, (_, core)))| Loaded::begin(load, core, regime));
+        let loaded = loaded.transpose()?;
         let mut rows = Vec::new();
         for group in self.groups(options) {
             rows.extend(group.measure(options)?);
@@ -69,6 +77,9 @@ impl Scenario {
         }
         if self == Self::Hop {
             hop::beside_its_parts(&mut rows);
+        }
+        if let Some(loaded) = loaded {
+            loaded.end(&mut rows)?;
         }
         Ok(Report {
             machine: Machine::here().to_string(),

@@ -101,6 +101,9 @@ fn figures_tell_what_the_robot_does_and_outlive_a_killed_gateway() {
             format!("lager_path_seconds_bucket{{robot=\"r1\",stage=\"total\",le=\"{end}\"}}");
         figures[&name]
     };
+    let longest = figures["lager_path_max_seconds{robot=\"r1\",stage=\"total\"}"];
+    let p999 = figures.get("lager_path_p999_seconds{robot=\"r1\",stage=\"total\"}");
+    assert!(longest > 0.0 && p999.is_none_or(|p999| *p999 <= longest));
     // A wider bucket counts at least as many. No wake-up is as fast as 1 us.
     assert!(bucket("0.000001024") <= bucket("1.073741824"));
     assert!(bucket("1.073741824") <= bucket("+Inf"));

@@ -23,6 +23,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     // It does not know the content of requests.
     ("lager-door", &[]),
     ("lager-battery", &[]),
+    ("lager-machine", &[]),
     ("lager-ax12", &[]),
     ("lager-exde", &[]),
     ("lager-pins", &[]),
@@ -226,6 +227,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "lager-floor",
             "lager-home",
+            "lager-machine",
             "lager-orders",
             "lager-ports",
             "lager-topics",
@@ -242,6 +244,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-home",
             "lager-lines",
             "lager-logic",
+            "lager-machine",
             "lager-operator",
             "lager-orders",
             "lager-ports",
@@ -267,6 +270,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-lines",
             "lager-loader",
             "lager-logic",
+            "lager-machine",
             "lager-monitor",
             "lager-operator",
             "lager-orders",

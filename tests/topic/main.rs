@@ -1,6 +1,7 @@
 //! Tests of `lager topic` and `lager top` on a user's own topics and beside a robot: what they
 //! measure, what they may publish, and that they show at once a topic that loses samples.
 
+mod bench;
 mod screen;
 
 use std::io::Write;
@@ -267,6 +268,23 @@ fn rates_delays_bytes_and_fields_are_shown_for_as_long_as_is_asked() {
             "{stage}: {delay}"
         );
     }
+    // Logic counts all of its frames, and tells the tail once a second.
+    let windows = json(&["delay", "sensor/line", "--duration", "3"]);
+    let mut told = windows.iter().rev().map(|window| &window["actor"]);
+    let told = told.find(|actor| !actor.is_null()).expect("logic tells");
+    let decided = &told["read_to_decided"];
+    assert_eq!(told["role"], "logic");
+    assert!(decided["samples"].as_u64() > Some(50), "{told}");
+    assert!(
+        decided["p99_ns"].is_null() || decided["p99_ns"].as_u64() <= decided["max_ns"].as_u64()
+    );
+    let shown = domain.run(&["topic", "delay", "steering/command", "--duration", "2"]);
+    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
+    assert!(
+        shown.contains("bridge itself, which the bus wakes"),
+        "{shown}"
+    );
+    assert!(shown.contains("read -> written"), "{shown}");
     let bw = &json(&["bw", "sensor/line", "--count", "50"])[0];
     let per_sample = bw["payload_bytes"].as_u64().zip(bw["stamp_bytes"].as_u64());
     assert_eq!(per_sample, Some((8, 56)), "{bw}");

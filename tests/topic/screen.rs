@@ -151,6 +151,8 @@ fn structure(picture: &str) -> String {
         let mut shown: Vec<String> = words.filter(|word| !is_bar(word)).map(shown).collect();
         let known = match shown.first().map(String::as_str) {
             Some("mission") => 1,
+            // Before an order is written, there is none.
+            Some("in") => 2,
             // In the last second there may be no value.
             Some("path") => shown
                 .iter()

@@ -29,6 +29,9 @@ use super::{End, Slept, TIME_OUT, sleep_until, spin};
 use crate::error::{BenchError, Fault, broken};
 use crate::sample::Sample;
 
+/// The listeners of an event: iceoryx2's default.
+pub(crate) const LISTENERS: usize = 16;
+
 /// The number of samples that a subscriber may hold, as in the typed ports.
 const MAX_HELD: usize = 4;
 
@@ -239,8 +242,6 @@ pub(crate) fn listening(
     member: &Member,
     [out, back]: [&str; 2],
 ) -> Result<impl End + use<>, BenchError> {
-    // iceoryx2's default.
-    const LISTENERS: usize = 16;
     let listener = member.listener(back, LISTENERS)?;
     let notifier = member.notifier(out, LISTENERS)?;
     let subscriber = member.subscriber::<Sample, Stamp>(back)?;
@@ -250,12 +251,20 @@ pub(crate) fn listening(
         notifier.notify().map_err(broken)?;
         Ok(())
     };
-    let sleep = move || match listener.timed_wait(|_| (), TIME_OUT) {
+    Ok((send, move || {
+        sleep_until(|| receive(&subscriber), asleep_on(&listener))
+    }))
+}
+
+/// Sleeps until the event is notified.
+pub(crate) fn asleep_on(
+    listener: &Listener<ipc::Service>,
+) -> impl FnMut() -> Result<Slept, Fault> + use<'_> {
+    || match listener.timed_wait(|_| (), TIME_OUT) {
         Ok(0) => Ok(Slept::TimedOut),
         Ok(_) => Ok(Slept::Woken),
         Err(error) => Err(broken(error)),
-    };
-    Ok((send, move || sleep_until(|| receive(&subscriber), &sleep)))
+    }
 }
 
 /// The next sample, if there is one.

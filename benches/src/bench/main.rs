@@ -8,10 +8,11 @@ mod command;
 mod link;
 mod robot;
 mod stop;
+mod topic;
 
 use std::fmt;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -21,7 +22,9 @@ use clap::{CommandFactory, Parser, ValueEnum};
 use lager_benches::chip::{self, Programs};
 use lager_benches::compare::Comparison;
 use lager_benches::saved::Saved;
-use lager_benches::{Mode, Options, Pace, Regime, Report, Scenario as Timed, at_least_one};
+use lager_benches::{
+    Load, Mode, Options, Pace, Regime, Report, SIZES, Scenario as Timed, at_least_one,
+};
 use serde::Serialize;
 
 /// The command line.
@@ -32,11 +35,14 @@ use serde::Serialize;
     about = "Measure the bus on this machine, beside its baselines in the same run",
     after_help = "Examples:
   lager bench hop --quick                          a first look, in seconds
-  lager bench hop --mode block --regime same-core  the software's share of a wake
+  lager bench hop --wait block --regime same-core  the software's share of a wake
+  lager bench hop --size 65536 --rate 100 --wait block
+                                                   your size, your rate
   lager bench path --runs 9 --json > path.json     for `benches/plot`
   lager bench fanout                               the writer's time for observers
   lager bench chip                                 the boards' images, in exact cycles
   lager bench stop                                 200 stops at full speed; --runs N for N
+  lager bench topic sensor/line                    a topic of the robot that is up
   lager bench hop --out before                     saved, to compare it later
   lager bench compare before.json after.json
 
@@ -52,7 +58,7 @@ hop through Zenoh, which needs many crates, is measured beside the others only b
 )]
 struct BenchArgs {
     #[command(subcommand)]
-    compare: Option<Action>,
+    action: Option<Action>,
     /// What to measure
     #[arg(required = true)]
     scenario: Option<Scenario>,
@@ -76,21 +82,32 @@ struct BenchArgs {
     /// (`hop`) [default: `full`, and 10000 with an adaptive receiver, too]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<Pace>,
+    /// The size of a sample in bytes: 8, 16, 64, 256, 1024, … or 1048576 (`hop`)
+    #[arg(long, value_name = "BYTES", allow_negative_numbers = true, value_parser = size)]
+    size: Option<usize>,
+    /// Add a row beside so many processes that only watch, 1 to 64 (`hop`, `path`)
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = observers)]
+    observers: Option<usize>,
+    /// Load the machine meanwhile, with `stress-ng`; `cyclictest` measures its floor beside it (`hop`,
+    /// `path`)
+    #[arg(long, value_name = "LOAD")]
+    load: Option<Load>,
     /// Save everything in NAME.json, for `lager bench compare`, and the histograms also in
     /// NAME.hlog, HdrHistogram's log format (`hop`, `path`, `fanout`)
     #[arg(long, value_name = "NAME")]
     out: Option<PathBuf>,
     /// How the receiver waits [default: all]
     #[arg(long, value_name = "MODE", value_delimiter = ',')]
-    mode: Vec<Mode>,
+    wait: Vec<Mode>,
     /// Where the processes run [default: all]
     #[arg(long, value_name = "REGIME", value_delimiter = ',')]
     regime: Vec<Regime>,
 }
 
-/// What `lager bench` does beside measuring.
+/// What `lager bench` does beside its scenarios.
 #[derive(Clone, Debug, clap::Subcommand)]
 enum Action {
+    Topic(topic::Args),
     /// Compare two saved measurements. Exit codes: 0 nothing is slower, 1 something is slower or
     /// missing, 2 they cannot be compared
     Compare {
@@ -115,6 +132,22 @@ fn two_cores(text: &str) -> Result<(usize, usize), String> {
     let two = text.split_once(',');
     let two = two.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
     two.ok_or_else(|| "give two cores, such as 0,1".to_owned())
+}
+
+/// The size of a hop's sample.
+fn size(text: &str) -> Result<usize, String> {
+    let bytes = text.parse().ok().filter(|bytes| SIZES.contains(bytes));
+    bytes.ok_or_else(|| {
+        let all: Vec<String> = SIZES.iter().map(usize::to_string).collect();
+        format!("give one of {}: each is a type of its own", all.join(", "))
+    })
+}
+
+/// How many observers may watch.
+fn observers(text: &str) -> Result<usize, String> {
+    let most = Options::OBSERVERS;
+    let number = text.parse().ok().filter(|many| (1..=most).contains(many));
+    number.ok_or_else(|| format!("give a number from 1 to {most}: a topic has so many places"))
 }
 
 /// How much slower still counts as the same.
@@ -151,17 +184,23 @@ const INCOMPARABLE: u8 = 2;
 fn main() -> ExitCode {
     lager_benches::run_if_asked();
     let args = BenchArgs::parse();
-    if let Some(Action::Compare {
-        a,
-        b,
-        limit,
-        across_machines,
-        json,
-    }) = &args.compare
-    {
-        let limit = 1.0 + limit / 100.0;
-        let compared = compare([a, b], limit, *across_machines, *json);
-        return ended("compare", compared, ExitCode::from(INCOMPARABLE));
+    match &args.action {
+        Some(Action::Compare {
+            a,
+            b,
+            limit,
+            across_machines,
+            json,
+        }) => {
+            let limit = 1.0 + limit / 100.0;
+            let compared = compare([a, b], limit, *across_machines, *json);
+            return ended("compare", compared, ExitCode::from(INCOMPARABLE));
+        }
+        Some(Action::Topic(args)) => {
+            let measured = topic::measure(args).map(|report| (report, ExitCode::SUCCESS));
+            return ended("topic", measured, ExitCode::FAILURE);
+        }
+        None => {}
     }
     if let Err(refused) = args.refuse_what_does_not_vary() {
         refused.exit();
@@ -213,12 +252,25 @@ impl BenchArgs {
     }
 
     fn refuse_what_does_not_vary(&self) -> Result<(), clap::Error> {
-        let varies = !self.mode.is_empty() || !self.regime.is_empty();
+        let varies = !self.wait.is_empty() || !self.regime.is_empty();
         let varies = varies || self.samples.is_some() || self.out.is_some();
         let varies = varies || self.cores.is_some() || self.rate.is_some();
+        let varies = varies || self.size.is_some() || self.observers.is_some();
+        let varies = varies || self.load.is_some();
         let sentence = match self.scenario() {
             Scenario::Path if self.rate.is_some() => {
                 "the path's frames come at 1 kHz, as its robot needs them; only `hop` takes --rate"
+            }
+            Scenario::Path if self.size.is_some() => {
+                "the path's frames are the boards' packets; only `hop` takes --size"
+            }
+            Scenario::Fanout if self.load.is_some() => {
+                "a fan-out's readers look without pause, which is load enough; only `hop` and `path` \
+                 take --load"
+            }
+            Scenario::Fanout if self.size.is_some() || self.observers.is_some() => {
+                "it publishes 64 bytes, 64 KiB and 1 MiB to 1, 8 and 64 readers; only `hop` takes \
+                 --size, and only `hop` and `path` take --observers"
             }
             Scenario::Fanout if self.rate.is_some() => {
                 "a writer publishes when all readers are ready; only `hop` takes --rate"
@@ -242,13 +294,19 @@ impl BenchArgs {
 
     /// Measures, and saves the result if that is asked for.
     fn timed(&self, scenario: Timed) -> Result<String> {
-        let report: Report = scenario.measure(&options(self))?;
-        if let Some(name) = &self.out {
-            let [json, hlog] = Saved::of(&report).write(name)?;
-            eprintln!("saved in {} and {}", json.display(), hlog.display());
-        }
+        let report = scenario.measure(&options(self))?;
+        saved(&report, self.out.as_deref())?;
         self.printed(&report)
     }
+}
+
+/// Saves the result, if that is asked for.
+fn saved(report: &Report, name: Option<&Path>) -> Result<()> {
+    if let Some(name) = name {
+        let [json, hlog] = Saved::of(report).write(name)?;
+        eprintln!("saved in {} and {}", json.display(), hlog.display());
+    }
+    Ok(())
 }
 
 /// How often a robot is stopped or gets a command: with `--quick`, and without.
@@ -305,7 +363,10 @@ fn options(args: &BenchArgs) -> Options {
         samples: args.samples,
         cores: args.cores,
         pace: args.rate,
-        modes: or_all(&args.mode),
+        size: args.size,
+        load: args.load,
+        observers: args.observers,
+        modes: or_all(&args.wait),
         regimes: or_all(&args.regime),
     }
 }
@@ -326,9 +387,9 @@ mod tests {
             "hop",
             "--runs",
             "9",
-            "--mode",
+            "--wait",
             "block,spin",
-            "--mode",
+            "--wait",
             "block",
             "--regime",
             "no-halt",
@@ -344,7 +405,10 @@ mod tests {
         for choice in [
             &["--quick"][..],
             &["--runs", "5"],
-            &["--mode", "spin"],
+            &["--wait", "spin"],
+            &["--size", "64"],
+            &["--observers", "8"],
+            &["--load", "cpu"],
             &["--regime", "plain"],
             &["--samples", "9"],
             &["--out", "x"],
@@ -360,10 +424,32 @@ mod tests {
     }
 
     #[test]
+    fn what_makes_no_sense_is_refused_with_its_reason() {
+        for (flags, words) in [
+            (&["path", "--size", "64"][..], "boards' packets"),
+            (&["path", "--rate", "100"], "1 kHz"),
+            (&["fanout", "--size", "64"], "64 readers"),
+            (&["fanout", "--observers", "8"], "64 readers"),
+            (&["fanout", "--load", "cpu"], "without pause"),
+        ] {
+            let args = parsed(flags).expect("valid");
+            let refused = args.refuse_what_does_not_vary().expect_err("no sense");
+            assert!(refused.to_string().contains(words), "{refused}");
+        }
+        for fits in [
+            &["path", "--observers", "8", "--load", "irq"][..],
+            &["hop", "--size", "64", "--observers", "8", "--load", "io"],
+        ] {
+            let args = parsed(fits).expect("valid");
+            assert!(args.refuse_what_does_not_vary().is_ok(), "{fits:?}");
+        }
+    }
+
+    #[test]
     fn two_files_are_compared_and_nothing_is_measured_with_them() {
         let two = parsed(&["compare", "a.json", "b.json", "--limit", "5"]).expect("valid");
         assert!(
-            matches!(two.compare, Some(Action::Compare { limit: 5.0, .. })),
+            matches!(two.action, Some(Action::Compare { limit: 5.0, .. })),
             "{two:?}"
         );
         for wrong in [
@@ -402,7 +488,10 @@ mod tests {
                 &["leap"][..],
                 "hop, path, fanout, chip, stop, command, link",
             ),
-            (&["hop", "--mode", "busy"], "spin, adaptive, block"),
+            (&["hop", "--wait", "busy"], "spin, adaptive, block"),
+            (&["hop", "--load", "fan"], "cpu, memory, io, irq"),
+            (&["hop", "--size", "7"], "64, 256, 1024"),
+            (&["hop", "--observers", "65"], "from 1 to 64"),
             (&["hop", "--regime", "calm"], "plain, same-core, no-halt"),
             (&["hop", "--runs", "0"], "1 or more"),
             (&["hop", "--cores", "0"], "such as 0,1"),

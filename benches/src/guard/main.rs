@@ -18,8 +18,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use lager_benches::chip::{self, ChipReport, Programs};
-use lager_benches::conditions::Machine;
 use lager_benches::{Scenario, at_least_one, median};
+use lager_machine::Machine;
 use serde::Serialize;
 
 use crate::error::{GuardError, read};

@@ -25,37 +25,47 @@ use crate::slow;
 
 /// The first of the two lines with pipes. Each line has a pipe for one process to write into: the
 /// end to read from, and the end to write to.
-const PIPES: usize = 0;
+pub(super) const PIPES: usize = 0;
 /// The eventfd that each of the two processes writes to.
 const EVENTFDS: usize = 2;
 /// The socket of each of the two processes.
 const UDS: usize = 3;
 /// The socket of each of the two processes.
-const TCP: usize = 4;
+pub(super) const TCP: usize = 4;
 
 /// The measurement of a round.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Job {
-    /// The number of the row in [`ROWS`].
+    /// The number of the row in [`ROWS`], or in those of any size.
     pub(super) row: usize,
     /// `Some` = one way is timed, by the clock at both ends, and a sample is due after each such
     /// time; zero is as fast as they come back. `None` = half of the round trip is timed by one
     /// end's clock, as fast as samples come back; only half of a delay at one end shows.
     pub(super) gap: Option<Duration>,
+    /// If the row is one of any size: the size of a sample in words.
+    pub(super) words: Option<usize>,
+    /// How many observers watch.
+    pub(super) observers: usize,
 }
 
-type Round = pair::Round<Job>;
+impl pair::Work for Job {
+    fn observers(&self) -> (usize, usize) {
+        (self.observers, self.words.unwrap_or_default())
+    }
+}
+
+pub(super) type Round = pair::Round<Job>;
 
 /// The baseline of spinning rows.
 pub(super) const HEADER: &str = "iceoryx2/header";
-const TO_HEADER: &[&str] = &[HEADER];
-const TO_EVENT: &[&str] = &["iceoryx2/event"];
+pub(super) const TO_HEADER: &[&str] = &[HEADER];
+pub(super) const TO_EVENT: &[&str] = &["iceoryx2/event"];
 
-const fn spins(label: &'static str, against: &'static [&'static str]) -> Entry {
+pub(super) const fn spins(label: &'static str, against: &'static [&'static str]) -> Entry {
     Entry::new(label, Mode::Spin, against)
 }
 
-const fn sleeps(label: &'static str, against: &'static [&'static str]) -> Entry {
+pub(super) const fn sleeps(label: &'static str, against: &'static [&'static str]) -> Entry {
     Entry::new(label, Mode::Block, against)
 }
 
@@ -134,20 +144,19 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
 /// One round in one of the two processes, with ends of its own. The sender returns the times of one
 /// way, in ns. If only one way is timed, it returns when it sent, and the receiver when it
 /// received.
-pub(super) fn round(side: &Side, round: &Round) -> Result<Noted, BenchError> {
-    let (_, exchange) = ROWS[round.what.row];
-    exchange(&One { side, round })
+pub(super) fn round(one: &One<'_>) -> Result<Noted, BenchError> {
+    ROWS[one.round.what.row].1(one)
 }
 
 /// One of the two processes in a round.
 pub(super) struct One<'a> {
-    side: &'a Side,
-    round: &'a Round,
+    pub(super) side: &'a Side,
+    pub(super) round: &'a Round,
 }
 
 impl One<'_> {
     /// Of a pair, one for each process: first this process's, then the other's.
-    fn own_first<T>(&self, [first, second]: [T; 2]) -> [T; 2] {
+    pub(super) fn own_first<T>(&self, [first, second]: [T; 2]) -> [T; 2] {
         match self.side.is_first {
             true => [first, second],
             false => [second, first],
@@ -159,7 +168,7 @@ impl One<'_> {
     }
 
     /// The names to which bare iceoryx2 and Zenoh publish and subscribe, in this order.
-    fn names(&self) -> [&'static str; 2] {
+    pub(super) fn names(&self) -> [&'static str; 2] {
         self.own_first(["bench/bare-ping", "bench/bare-pong"])
     }
 
@@ -194,12 +203,33 @@ impl One<'_> {
     /// Exchanges the samples, and keeps this end until the other process has finished too.
     fn exchange(&self, mut end: impl End) -> Result<Noted, BenchError> {
         self.side.together(self.round, || match self.side.is_first {
-            true => self.send_and_time(&mut end),
-            false => self.send_back(&mut end),
+            true => self.time_each(|number| {
+                let sent = Clock::monotonic_ns();
+                let sample = end
+                    .send(&Sample::new(number))
+                    .and_then(|()| end.receive())
+                    .map_err(|fault| self.round.failed(number, fault))?;
+                let received = Clock::monotonic_ns();
+                self.check(number, &sample)?;
+                Ok([sent, received])
+            }),
+            false => self.answer_each(|number| {
+                let failed = |fault| self.round.failed(number, fault);
+                let sample = end.receive().map_err(failed)?;
+                let received = self.now();
+                end.send(&sample).map_err(failed)?;
+                self.check(number, &sample)?;
+                Ok(received)
+            }),
         })
     }
 
-    fn send_and_time(&self, end: &mut impl End) -> Result<Noted, BenchError> {
+    /// The sender's times of all samples. `there_and_back` sends one and waits until it is back: when
+    /// both was.
+    pub(super) fn time_each(
+        &self,
+        mut there_and_back: impl FnMut(u64) -> Result<[u64; 2], BenchError>,
+    ) -> Result<Noted, BenchError> {
         let round = self.round;
         let mut times = Vec::with_capacity(round.all().count());
         let period = round.what.gap.filter(|gap| !gap.is_zero());
@@ -218,13 +248,7 @@ impl One<'_> {
                 due.push(next.due);
                 while Clock::monotonic_ns() < next.send {}
             }
-            let sent = Clock::monotonic_ns();
-            let sample = end
-                .send(&Sample::new(number))
-                .and_then(|()| end.receive())
-                .map_err(|fault| round.failed(number, fault))?;
-            let received = Clock::monotonic_ns();
-            self.check(number, &sample)?;
+            let [sent, received] = there_and_back(number)?;
             times.push(match round.what.gap {
                 None => (received - sent) / 2,
                 Some(_) => sent,
@@ -236,20 +260,22 @@ impl One<'_> {
         })
     }
 
-    fn send_back(&self, end: &mut impl End) -> Result<Noted, BenchError> {
-        let round = self.round;
-        let one_way = round.what.gap.is_some();
-        let mut times = Vec::with_capacity(round.all().count());
-        for number in round.all() {
-            let failed = |fault| round.failed(number, fault);
-            let sample = end.receive().map_err(failed)?;
-            if one_way {
-                times.push(Clock::monotonic_ns());
-            }
-            end.send(&sample).map_err(failed)?;
-            self.check(number, &sample)?;
+    /// The receiver's times of all samples, if one way is timed. `answer` receives one and sends it
+    /// back: when it was received.
+    pub(super) fn answer_each(
+        &self,
+        mut answer: impl FnMut(u64) -> Result<Option<u64>, BenchError>,
+    ) -> Result<Noted, BenchError> {
+        let mut times = Vec::with_capacity(self.round.all().count());
+        for number in self.round.all() {
+            times.extend(answer(number)?);
         }
         Ok(times.into())
+    }
+
+    /// The time, if the receiver's is needed.
+    pub(super) fn now(&self) -> Option<u64> {
+        self.round.what.gap.map(|_| Clock::monotonic_ns())
     }
 
     fn check(&self, expected: u64, sample: &Sample) -> Result<(), BenchError> {

@@ -15,7 +15,7 @@ use crate::baseline::iceoryx::Member;
 use crate::baseline::{LIMIT, TIME_OUT};
 use crate::error::{BenchError, Fault, broken, no_bus};
 use crate::pair::{self, Noted, Side};
-use crate::sample::{Block, Ping, RECEIVER, SENDER, Sample, drain};
+use crate::sample::{Block, Ping, RECEIVER, SENDER, Sample, depth, drain};
 use crate::slow;
 
 /// Sizes of a block, in words of 8 bytes.
@@ -35,6 +35,8 @@ pub(super) enum Job {
     /// Bare iceoryx2 notifies `listeners` listeners.
     Notify { listeners: usize },
 }
+
+impl pair::Work for Job {}
 
 type Round = pair::Round<Job>;
 
@@ -60,18 +62,14 @@ pub(super) fn round(side: &Side, round: &Round) -> Result<Noted, BenchError> {
     times.map(Noted::from)
 }
 
-/// The topic of blocks of that size. Small ones have `sensor/line`'s depth. Large ones have depth
-/// 1, because a publisher keeps memory for every sample that could lie in a subscriber's queue.
+/// The topic of blocks of that size.
 struct Fan<const WORDS: usize>;
 
 impl<const WORDS: usize> Topic for Fan<WORDS> {
     const NAME: &'static str = "bench/fan";
     type Payload = Block<WORDS>;
     const QOS: Qos = Qos {
-        buffer: match WORDS {
-            ..=512 => SensorLine::QOS.buffer,
-            _ => 1,
-        },
+        buffer: depth(WORDS),
         actors: &[],
         ..SensorLine::QOS
     };
@@ -183,7 +181,7 @@ fn ring(side: &Side, round: &Round) -> Times {
 }
 
 fn notify(side: &Side, round: &Round, listeners: usize) -> Times {
-    let member = Member::join(&side.config, Some(Ping::QOS))?;
+    let member = Member::join(&side.config, Some(<Ping>::QOS))?;
     // A service keeps its number of listeners for ever, so each number has a service.
     let name = format!("bench/bare-ring-{listeners}");
     if side.is_first {

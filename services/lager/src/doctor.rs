@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use lager_bridge::serial::{find, holders};
 use lager_home::Clock;
+use lager_machine::{Conditions, Machine, Observed};
 use lager_ports::NodeState;
 use lager_supervisor::console;
 use rustix::process::{Resource, getrlimit};
@@ -29,6 +30,9 @@ use crate::{diagnose, exit};
 const SHARED_MEMORY_MIB: u64 = 16;
 /// Open files that one process of the bus may need: each port and connection holds some.
 const OPEN_FILES: u64 = 4096;
+
+/// From this share of all cores on, other virtual machines make measured latencies worthless.
+const STOLEN_PERCENT: f64 = 1.0;
 
 /// The longest first clause that stands in a line of its own.
 const LONGEST_CLAUSE: usize = 76;
@@ -55,6 +59,7 @@ const BUSY_LOOK: Duration = Duration::from_secs(20);
 
 /// Runs all checks; fails when a result is bad.
 pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
+    let observed = Observed::begin(None);
     // First what every robot needs, then what this robot's body needs, then what makes it faster.
     let mut checks = vec![
         ("bus", bus_in_time(config, fix)),
@@ -71,6 +76,9 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
     ];
     checks.extend(boards::findings(config, fix));
     checks.extend(realtime::findings(config));
+    let conditions = observed.end();
+    checks.push(("machine", machine(&Machine::here(), &conditions)));
+    checks.push(("meanwhile", meanwhile(&conditions)));
     // Bad results come first.
     checks.sort_by_key(|(_, finding)| !matches!(finding, Bad(_)));
     let told = match as_json {
@@ -115,6 +123,22 @@ impl Finding {
 fn count(checks: &[Check], mark: &str) -> usize {
     let of_that_mark = checks.iter().filter(|(_, finding)| finding.mark() == mark);
     of_that_mark.count()
+}
+
+/// What decides about times of this machine, in the words of a report of `lager bench`.
+fn machine(machine: &Machine, conditions: &Conditions) -> Finding {
+    Good(format!("{machine}; {}", conditions.settings()))
+}
+
+/// What else it did while the checks ran. Other virtual machines take time that nobody here sees.
+fn meanwhile(conditions: &Conditions) -> Finding {
+    let told = conditions.meanwhile();
+    match conditions.stolen_percent {
+        STOLEN_PERCENT.. => Hint(format!(
+            "{told}; other virtual machines take the cores, so no latency measured now is this machine's"
+        )),
+        _ => Good(told),
+    }
 }
 
 /// Whether the dates of recordings can be right. Nothing else uses the calendar.
@@ -520,6 +544,23 @@ fn users_of(file: &Path) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_machine_that_shares_its_cores_is_no_place_to_measure() {
+        let took = |stolen_percent| {
+            meanwhile(&Conditions {
+                stolen_percent,
+                ..Conditions::default()
+            })
+        };
+        assert_eq!((took(0.2).mark(), took(3.0).mark()), ("ok", "hint"));
+        let here = machine(&Machine::here(), &Observed::begin(None).end());
+        assert!(
+            here.said().contains("interrupts on mask"),
+            "{}",
+            here.said()
+        );
+    }
 
     #[test]
     fn what_is_bad_stands_first_and_long_texts_below() {

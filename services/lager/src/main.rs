@@ -296,7 +296,9 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Bag(args) => return bag::run(&config, args, &shutdown),
-        Command::Bench { arguments } => return Err(bench::become_it(&arguments)),
+        Command::Bench { arguments } => {
+            return Err(bench::become_it(&arguments, &config.bus()?));
+        }
         Command::Board(args) => {
             board::run(&config, &args, &shutdown)?;
             return Ok(ExitCode::SUCCESS);

@@ -15,16 +15,21 @@
 //! Over a robot's gateway the clocks of both machines are compared by round trips. A delay between
 //! them that is smaller than the comparison is sure has no figure: `-` in text, null in JSON.
 //!
+//! Of the topics of the path it also tells what logic and bridge have counted themselves ([`Actor`]).
+//!
 //! `read` contains the time that the bus takes, as far as an observer can see it. `lager bench hop`
 //! measures how long a receiver takes that the bus wakes.
 
+use std::cell::Cell;
 use std::io::Write;
 use std::time::Duration;
 
 use hdrhistogram::Histogram;
+use lager_ports::ReceiveError;
 use lager_wake::Pace;
 use serde_json::{Value, json};
 
+use crate::actor::Actor;
 use crate::measure::{Arrival, Gauge, Limits, Plan};
 use crate::origin::Origin;
 use crate::{ToolError, Tools};
@@ -42,13 +47,19 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
     /// # Errors
     /// No topic has that name, it cannot be read, or the output cannot be written.
     pub fn delay(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
+        let open = || Actor::of(name, self.place);
+        let actor = self.watchdog.over("opening the topic", open);
+        let actor = Cell::new(actor.map_err(Into::into)?);
         let plan = Plan {
             limits,
             pace: Pace::every(POLL),
             woken: true,
             head: HEAD,
             needs_clock: true,
-            gauge: |_| Delays::default(),
+            gauge: |_| Delays {
+                actor: actor.take(),
+                ..Delays::default()
+            },
         };
         self.measure(name, &plan)
     }
@@ -91,9 +102,12 @@ impl Stage {
     /// The figures that are not smaller than the clocks are unsure.
     fn as_json(&self, unsure_ns: u64) -> Value {
         let sure = |ns: u64| (ns >= unsure_ns).then_some(ns);
+        // With fewer than ten beyond it, it would be little more than the longest by another name.
+        let is_many = self.0.len() >= 10_000;
+        let p999 = is_many.then(|| sure(self.at(99.9))).flatten();
         json!({
             "p50_ns": sure(self.at(50.0)), "p90_ns": sure(self.at(90.0)),
-            "p99_ns": sure(self.at(99.0)), "p999_ns": sure(self.at(99.9)),
+            "p99_ns": sure(self.at(99.0)), "p999_ns": p999,
             "max_ns": sure(self.max()),
         })
     }
@@ -108,7 +122,7 @@ fn ms(ns: u64, unsure_ns: u64) -> String {
 }
 
 /// The delays of one window.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Delays {
     samples: u64,
     /// From the source to the publication.
@@ -119,6 +133,8 @@ struct Delays {
     read: Stage,
     /// How far the last two may be wrong, at most.
     unsure_ns: u64,
+    /// Who counts these samples itself.
+    actor: Option<Actor>,
 }
 
 impl Gauge for Delays {
@@ -135,8 +151,19 @@ impl Gauge for Delays {
         );
     }
 
-    fn next(&self) -> Self {
-        Self::default()
+    fn next(self) -> Self {
+        Self {
+            actor: self.actor,
+            ..Self::default()
+        }
+    }
+
+    fn look(&mut self) -> Result<(), ReceiveError> {
+        self.actor.as_mut().map_or(Ok(()), Actor::look)
+    }
+
+    fn last_words(&self) -> String {
+        self.actor.as_ref().map_or_else(String::new, Actor::as_text)
     }
 
     fn as_json(&self) -> Value {
@@ -145,6 +172,7 @@ impl Gauge for Delays {
             "publish_to_receive": self.read.as_json(self.unsure_ns),
             "own_wait": self.own_wait.as_json(self.unsure_ns),
             "clock_unsure_ns": self.unsure_ns,
+            "actor": self.actor.as_ref().map(Actor::as_json),
         })
     }
 

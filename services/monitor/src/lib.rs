@@ -15,6 +15,7 @@
 //! lost. A watchdog guards every call into the bus, so a tool reports a bus that does not answer,
 //! and does not wait for it.
 
+mod actor;
 mod block;
 mod delay;
 mod describe;

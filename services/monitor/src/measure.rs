@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_ports::Source;
+use lager_ports::{ReceiveError, Source};
 use lager_sample::{Stamp, Topic};
 use lager_topics::{TopicVisitor, visit};
 use lager_wake::Pace;
@@ -61,7 +61,20 @@ pub(crate) trait Gauge {
     fn add(&mut self, seen: &Arrival);
 
     /// The gauge of the next window.
-    fn next(&self) -> Self;
+    fn next(self) -> Self;
+
+    /// Looks at what it shows beside the samples, at the end of each window.
+    ///
+    /// # Errors
+    /// The transport failed.
+    fn look(&mut self) -> Result<(), ReceiveError> {
+        Ok(())
+    }
+
+    /// What is said for people after the last window; empty for nothing.
+    fn last_words(&self) -> String {
+        String::new()
+    }
 
     /// The figures for programs, as an object.
     fn as_json(&self) -> Value;
@@ -131,12 +144,12 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
             writeln!(self.out, "{}", plan.head)?;
         }
         let mut gauge = (plan.gauge)(size);
-        while !is_over {
+        'windows: while !is_over {
             let before = total;
             let end = Instant::now() + WINDOW;
             while !is_over && Instant::now() < end {
                 if self.shutdown.is_requested() {
-                    return Ok(());
+                    break 'windows;
                 }
                 let looked_ns = self.place.time().now_ns;
                 let so_far = total;
@@ -168,6 +181,7 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
             // A loss over a link is taken back if the sample comes late.
             let newly_lost = from.lost().saturating_sub(lost);
             lost = from.lost();
+            self.watchdog.over("reading the topic", || gauge.look())?;
             if self.as_json {
                 let mut value = gauge.as_json();
                 value["topic"] = json!(name);
@@ -181,6 +195,10 @@ impl<W: Write, P: Origin> Tools<'_, W, P> {
             }
             gauge = gauge.next();
             self.out.flush()?;
+        }
+        let last = gauge.last_words();
+        if !self.as_json && !last.is_empty() {
+            writeln!(self.out, "{last}")?;
         }
         Ok(())
     }

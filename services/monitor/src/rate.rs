@@ -98,7 +98,7 @@ impl Gauge for Rate {
         self.samples += 1;
     }
 
-    fn next(&self) -> Self {
+    fn next(self) -> Self {
         Self {
             before_ns: self.latest_ns(),
             ..Self::default()
@@ -141,7 +141,7 @@ impl Gauge for Bandwidth {
         self.rate.add(seen);
     }
 
-    fn next(&self) -> Self {
+    fn next(self) -> Self {
         Self {
             payload: self.payload,
             rate: self.rate.next(),

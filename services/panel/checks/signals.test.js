@@ -93,3 +93,13 @@ test("the histogram has all frames that were told, once", () => {
   assert.ok(from.every((at, index) => index === 0 || at > from[index - 1]));
   assert.ok(frames.quantile(0.5) < 700);
 });
+
+test("a percentile of all frames has ten of them beyond it", () => {
+  const frames = new Frames();
+  frames.add(900, [40, 9_998, 45, 1]);
+  assert.equal(frames.quantile(0.999), null);
+  assert.ok(frames.quantile(0.99) < 300);
+  frames.add(1_000, [45, 1]);
+  assert.ok(frames.quantile(0.999) < 300);
+  assert.equal(frames.longest, 1_000);
+});

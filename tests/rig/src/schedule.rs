@@ -3,6 +3,7 @@
 use core::error::Error;
 use core::marker::PhantomData;
 
+pub use lager_machine::usable_cores;
 use lager_wake::urgency;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
@@ -88,17 +89,6 @@ impl Placement {
 pub struct Unbound {
     core: usize,
     detail: rustix::io::Errno,
-}
-
-/// The cores this thread may use, in ascending order.
-#[must_use]
-pub fn usable_cores() -> Vec<usize> {
-    let Ok(set) = sched_getaffinity(None) else {
-        return Vec::new();
-    };
-    (0..CpuSet::MAX_CPU)
-        .filter(|core| set.is_set(*core))
-        .collect()
 }
 
 /// Binds the calling thread, and all that it starts from now on, to `core`.

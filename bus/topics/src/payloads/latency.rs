@@ -17,6 +17,9 @@ const FIRST: u32 = 8;
 /// The upper end of the last bucket but one is 2 to the power of this, in ns.
 const LAST: u32 = 30;
 
+/// A percentile of a tail is a figure only if this many durations lie beyond it.
+const BEYOND: u64 = 10;
+
 /// Each doubling is divided into 2 to the power of this many buckets.
 const PARTS: u32 = 2;
 
@@ -191,6 +194,14 @@ impl Durations {
         0
     }
 
+    /// The same far out in the tail, such as 0.999. `None` if fewer than ten durations lie beyond it:
+    /// it would be little more than the longest by another name.
+    pub fn tail_ns(&self, part: f64) -> Option<u64> {
+        let beyond = self.buckets.iter().sum::<u64>() as f64 * (1.0 - part);
+        // A part such as 0.999 is not exact in binary.
+        (beyond + 1e-6 >= BEYOND as f64).then(|| self.quantile_ns(part))
+    }
+
     /// The mean, in ns; 0 if nothing was counted.
     pub fn mean_ns(&self) -> u64 {
         self.sum_ns.checked_div(self.count).unwrap_or(0)
@@ -259,6 +270,14 @@ mod tests {
         assert_eq!(of([3_000_000_000]).quantile_ns(0.5), 3_000_000_000);
         assert_eq!(Durations::default().quantile_ns(0.99), 0);
         assert_eq!(Durations::default().mean_ns(), 0);
+    }
+
+    #[test]
+    fn a_tail_needs_ten_durations_beyond_it() {
+        let many = |count: u64| of((0..count).map(|_| 7_000));
+        assert_eq!(many(10_000).tail_ns(0.999), Some(7_000));
+        assert_eq!(many(9_999).tail_ns(0.999), None);
+        assert_eq!(many(0).tail_ns(0.5), None);
     }
 
     #[test]

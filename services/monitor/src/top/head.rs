@@ -177,10 +177,14 @@ impl Head {
         let path: serde_json::Map<String, Value> = self
             .stages()
             .into_iter()
-            .map(|(name, stage)| {
-                let [p50, p99] = [0.5, 0.99].map(|part| stage.quantile_ns(part));
+            .map(|(name, Stage { recent, whole })| {
+                let [p50, p99] = [0.5, 0.99].map(|part| recent.quantile_ns(part));
                 let shown = json!({
-                    "count": stage.count, "p50_ns": p50, "p99_ns": p99, "max_ns": stage.max_ns,
+                    "count": recent.count, "p50_ns": p50, "p99_ns": p99, "max_ns": recent.max_ns,
+                    "in_all": {
+                        "count": whole.count, "p999_ns": whole.tail_ns(0.999),
+                        "max_ns": whole.max_ns,
+                    },
                 });
                 (name.replace(' ', "_"), shown)
             })
@@ -213,6 +217,15 @@ pub(crate) struct Recent<T> {
     spans: Vec<Span<T>>,
     /// The process and epoch of the last sample's writer, in a recording.
     life: Option<(u32, u64)>,
+}
+
+/// The durations of a stage of the path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stage {
+    /// Those of the last second, or of a whole recording.
+    pub(crate) recent: Durations,
+    /// All since the service started that counts them, or of a whole recording.
+    pub(crate) whole: Durations,
 }
 
 /// The last counts, and the counts before them. No earlier counts mean that all of the last ones
@@ -254,7 +267,17 @@ impl<T: Copy> Recent<T> {
         self.spans.push(Span { before, now });
     }
 
-    fn of(&self, stage: impl Fn(&T) -> &Durations) -> Durations {
+    /// The counts of a stage.
+    fn of(&self, stage: impl Fn(&T) -> &Durations) -> Stage {
+        let recent = self.recent(&stage);
+        let whole = match (self.life, self.spans.last()) {
+            (None, Some(span)) => *stage(&span.now),
+            _ => recent,
+        };
+        Stage { recent, whole }
+    }
+
+    fn recent(&self, stage: impl Fn(&T) -> &Durations) -> Durations {
         let spans = self.spans.iter().map(|span| match &span.before {
             Some(before) => stage(&span.now).since(stage(before)),
             None => *stage(&span.now),
@@ -282,7 +305,7 @@ impl Head {
 
     /// The stages of the path in their order, by name: from frames to their decision, and from
     /// orders to the wire. The last stage of each is the whole way.
-    pub(crate) fn stages(&self) -> [(&'static str, Durations); 7] {
+    pub(crate) fn stages(&self) -> [(&'static str, Stage); 7] {
         [
             ("read", self.path.of(|path| &path.read_publish)),
             ("to logic", self.path.of(|path| &path.publish_receive)),
@@ -348,6 +371,53 @@ mod tests {
     }
 
     #[test]
+    fn the_tail_is_that_of_all_that_was_counted() {
+        let counted = |times: usize, longest_us: u64| {
+            let mut total = Durations::default();
+            (0..times).for_each(|_| total.record(100_000));
+            total.record(longest_us * 1_000);
+            PathLatency {
+                total,
+                ..PathLatency::default()
+            }
+        };
+        let mut head = Head::default();
+        head.path.take(counted(9_998, 5_000));
+        let mut later = counted(9_998, 5_000);
+        later.total.record(200_000);
+        head.path.take(later);
+        let told = &head.as_json(0)["path"]["decided"];
+        assert_eq!(
+            (&told["count"], &told["p99_ns"]),
+            (&json!(1), &json!(229_376))
+        );
+        let all = &told["in_all"];
+        assert_eq!(
+            (&all["count"], &all["max_ns"]),
+            (&json!(10_000), &json!(5_000_000))
+        );
+        assert!(
+            all["p999_ns"].as_u64().is_some_and(|ns| ns < 200_000),
+            "{told}"
+        );
+        head.path.take(counted(99, 5_000));
+        assert_eq!(
+            head.as_json(0)["path"]["decided"]["in_all"]["p999_ns"],
+            Value::Null
+        );
+        // Of a recording, the same frames are shown twice.
+        let mut head = Head::default();
+        let stamp = Stamp {
+            epoch: 5,
+            ..Stamp::default()
+        };
+        head.path.take_recorded(counted(9, 5_000), &stamp, 10);
+        head.path.take_recorded(counted(19, 5_000), &stamp, 10);
+        let [(.., decided)] = [head.stages()[3]];
+        assert_eq!((decided.recent.count, decided.whole.count), (10, 10));
+    }
+
+    #[test]
     fn the_battery_is_told_while_its_board_is_heard() {
         let pack = Pack {
             cells: 3,
@@ -387,9 +457,9 @@ mod tests {
         };
         let mut live = Recent::default();
         live.take(counted(5));
-        assert_eq!(live.of(|counts| counts).count, 5);
+        assert_eq!(live.recent(|counts| counts).count, 5);
         live.take(counted(7));
-        assert_eq!(live.of(|counts| counts).count, 2);
+        assert_eq!(live.recent(|counts| counts).count, 2);
 
         let mut recorded = Recent::default();
         let begun_ns = 1_000;
@@ -401,7 +471,7 @@ mod tests {
             recorded.take_recorded(counted(times), &stamp, begun_ns);
         }
         // Five before the recording began, four of them in it, and four of the next writer.
-        assert_eq!(recorded.of(|counts| counts).count, 8);
+        assert_eq!(recorded.recent(|counts| counts).count, 8);
     }
 
     #[test]

@@ -3,16 +3,17 @@
 //! ```text
 //!  robot, mode, how many topics are in trouble, clock, load
 //!  stop, both links, mission, battery           (four or five lines)
-//!  the way of frames to logic's decision, or with room each stage
+//!  the way of frames to logic's decision, or with room each stage, and the tail of all of them
 //!  the table: the most telling columns first, the others where there is room
 //!  the keys, or the filter while it is typed
 //! ```
 
+use lager_topics::Durations;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 
-use super::head::shares;
+use super::head::{Stage, shares};
 use super::model::{Model, Sort};
 use super::row::{Row, Trouble};
 use crate::life::{Life, span};
@@ -29,16 +30,15 @@ const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '
 const HELP: &[&str] = &[
     "Up Down PgUp PgDn Home End   choose a row",
     "Left Right                   other columns, if not all fit",
-    "Space Enter                  open or close it: top does not read closed ones",
-    "+  -                         open all rows, close all rows",
+    "Space Enter   +  -           open or close it, or all; closed ones are not read",
     "/  F4                        filter: top reads only what passes; Esc clears it",
     "<  >  F6                     sort by the previous column, by the next one",
     "I                            reverse the order",
     "p  Z                         pause: the picture stands, counting goes on",
     "f                            freeze: rows keep their places",
     "l                            latencies of the path, stage by stage",
+    "                             (in all: since logic and bridge started)",
     "q  Esc  F10  Ctrl-C          leave",
-    "",
     "!  samples were lost in the last 30 s    x  its writer is dead or frozen",
     "~  less than half of what is expected    ?  cannot be read    -  closed",
     "LOST counts samples that were lost on the way, SKIP those that came too fast",
@@ -193,7 +193,8 @@ fn path(model: &Model, page: &mut Page<'_>) {
     };
     let is_roomy = page.area.height >= ROOMY;
     let shows_all = model.view.shows_path.unwrap_or(is_roomy);
-    for (name, stage) in model.head.stages() {
+    let stages = model.head.stages();
+    for (name, Stage { recent: stage, .. }) in stages {
         let label = match shows_all {
             true => format!("{:14}", format!("path {name}")),
             false if name == "decided" => "path     ".to_owned(),
@@ -218,6 +219,23 @@ fn path(model: &Model, page: &mut Page<'_>) {
     if shows_all {
         page.put("               10 us   100 us  1 ms    10 ms", dim());
     }
+    // The tail needs more than a second: it is that of all that the services have counted.
+    let tails = stages
+        .into_iter()
+        .filter(|(name, stage)| ["decided", "total"].contains(name) && stage.whole.count > 0);
+    let tails: Vec<_> = tails
+        .map(|(name, stage)| tail(name, &stage.whole))
+        .collect();
+    if !tails.is_empty() {
+        page.put(&format!("in all    {} ms", tails.join(", ")), plain());
+    }
+}
+
+/// The far end of a stage's durations, in ms.
+fn tail(name: &str, whole: &Durations) -> String {
+    let ms = |ns: u64| format!("{:.3}", ns as f64 / 1e6);
+    let p999 = whole.tail_ns(0.999).map_or_else(|| "-".to_owned(), ms);
+    format!("{name} p99.9 {p999} max {}", ms(whole.max_ns))
 }
 
 /// Shares as bars. A higher bar is more frequent, and even a rare one is visible.

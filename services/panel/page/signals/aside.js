@@ -24,7 +24,7 @@ export class Histogram {
       return { name, element: add(row, "dd") };
     });
     this.said = add(parent, "p", { className: "quiet" });
-    /** @type {Record<string, number>} In us. */
+    /** @type {Record<string, number | null>} In us; null if there are too few frames. */
     this.marks = {};
   }
 
@@ -51,11 +51,14 @@ export class Histogram {
     const { from, counts } = frames.steps();
     const total = counts.reduce((sum, count) => sum + count, 0);
     const quantiles = Object.entries(PARTS).map(([name, part]) => [name, frames.quantile(part)]);
-    this.marks = { ...Object.fromEntries(quantiles), max: frames.longest };
+    this.marks = { ...Object.fromEntries(quantiles), max: total ? frames.longest : null };
     const data = [from, counts.map(Math.sqrt)];
     this.box.ready(data)?.setData(data);
     put(this.title, say("path_histogram"));
-    for (const { name, element } of this.figures) put(element, total ? micros(this.marks[name] ?? 0) : "\u2013");
+    for (const { name, element } of this.figures) {
+      const us = this.marks[name] ?? null;
+      put(element, us === null ? "\u2013" : micros(us));
+    }
     put(this.said, total ? say("frames_told", total) : say("frames_none"));
   }
 
@@ -72,7 +75,9 @@ export class Histogram {
     ctx.fillStyle = colours.ink;
     let free = -Infinity;
     for (const name of MARKED) {
-      const x = Math.round(valToPos(this.marks[name] ?? 0, "x", true));
+      const us = this.marks[name] ?? null;
+      if (us === null) continue;
+      const x = Math.round(valToPos(us, "x", true));
       if (!(x >= bbox.left && x <= bbox.left + bbox.width + 1)) continue;
       ctx.fillRect(x, bbox.top - 4 * ratio, ratio, bbox.height + 4 * ratio);
       const width = ctx.measureText(name).width;

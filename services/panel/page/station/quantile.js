@@ -37,6 +37,9 @@ export function quantile(part, counted, longest) {
   return longest;
 }
 
+/** A percentile is a figure only if so many frames lie beyond it: it would be little more than the longest by another name. */
+const BEYOND = 10;
+
 /** The frames of many reports, by how long they took. */
 export class Frames {
   constructor() {
@@ -71,11 +74,15 @@ export class Frames {
   }
 
   /**
-   * The time that a part of them did not exceed, in us.
+   * The time that a part of them did not exceed, in us; null if fewer than ten lie beyond it.
    *
    * @param {number} part from 0 to 1
+   * @returns {number | null}
    */
   quantile(part) {
+    const frames = this.counts.reduce((sum, count) => sum + count, 0);
+    // A part such as 0.999 is not exact in binary.
+    if (frames * (1 - part) + 1e-6 < BEYOND) return null;
     return quantile(part, this.counts.flatMap((count, bucket) => [bucket, count]), this.longest);
   }
 

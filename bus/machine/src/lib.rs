@@ -1,10 +1,22 @@
-//! What decides about times besides the code: the machine, and what it did meanwhile. A report names
-//! it, because a figure without it cannot be compared with any other.
+//! What decides about times besides the code: the machine, and what it did meanwhile. A report of
+//! `lager bench` names it, because a figure without it cannot be compared with any other, and `lager
+//! doctor` tells the same of a machine before anything is measured. It only reads.
 
 use core::fmt;
 
-use lager_rig::schedule::usable_cores;
+use rustix::thread::{CpuSet, sched_getaffinity};
 use serde::{Deserialize, Serialize};
+
+/// The cores this thread may use, in ascending order.
+#[must_use]
+pub fn usable_cores() -> Vec<usize> {
+    let Ok(set) = sched_getaffinity(None) else {
+        return Vec::new();
+    };
+    (0..CpuSet::MAX_CPU)
+        .filter(|core| set.is_set(*core))
+        .collect()
+}
 
 /// The cores of the two processes of a measurement.
 pub type Cores = (usize, usize);
@@ -46,7 +58,8 @@ impl Machine {
     }
 
     /// The first thing in which another one differs: its name, and both values.
-    pub(crate) fn differs(&self, other: &Self) -> Option<(&'static str, String, String)> {
+    #[must_use]
+    pub fn differs(&self, other: &Self) -> Option<(&'static str, String, String)> {
         let fields = |machine: &Self| {
             [
                 ("processor", machine.processor.clone()),
@@ -130,22 +143,42 @@ impl fmt::Display for Conditions {
         }
         write!(
             formatter,
-            ", interrupts on mask {}\nload before {}; meanwhile {:.1} % stolen, others {:.0} % of a core",
-            self.interrupts, self.load, self.stolen_percent, self.others_percent
+            ", interrupts on mask {}\n{}",
+            self.interrupts,
+            self.meanwhile()
         )
+    }
+}
+
+impl Conditions {
+    /// What else the machine did.
+    #[must_use]
+    pub fn meanwhile(&self) -> String {
+        format!(
+            "load before {}; meanwhile {:.1} % stolen, others {:.0} % of a core",
+            self.load, self.stolen_percent, self.others_percent
+        )
+    }
+
+    /// What it was set to.
+    #[must_use]
+    pub fn settings(&self) -> String {
+        let told = self.to_string();
+        told.lines().next().unwrap_or_default().to_owned()
     }
 }
 
 /// Takes note of what the machine does from its beginning on.
 #[derive(Debug)]
-pub(crate) struct Observed {
+pub struct Observed {
     conditions: Conditions,
     before: Ticks,
 }
 
 impl Observed {
     /// Begins, for a measurement on these cores.
-    pub(crate) fn begin(cores: Option<Cores>) -> Self {
+    #[must_use]
+    pub fn begin(cores: Option<Cores>) -> Self {
         let states = |folder: &str| {
             let names = (0..16).map_while(|state| {
                 let path = format!("{folder}/state{state}/name");
@@ -171,7 +204,8 @@ impl Observed {
     }
 
     /// What it has seen until now.
-    pub(crate) fn end(self) -> Conditions {
+    #[must_use]
+    pub fn end(self) -> Conditions {
         let (before, now) = (self.before, Ticks::now());
         let all = now.all.saturating_sub(before.all).max(1) as f64;
         let cores = usable_cores().len().max(1) as f64;
