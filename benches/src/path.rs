@@ -26,7 +26,10 @@
 //! A watcher is the same, but every sample wakes it (`lager bench fanout`).
 //!
 //! A listener is a process that gets every sample of every topic over Zenoh, from a gateway of the
-//! robot in a process of its own, as from a network.
+//! robot in a process of its own, as from a network. It is on the robot's cores, as there are no
+//! others, and takes only the processor time that nobody else wants (SCHED_IDLE): on a network it
+//! would take none. The gateway is scheduled as `lager gateway` is. What the kernel does for the
+//! sockets counts.
 //!
 //! **Cores**: the boards, the bridge and the floor's ends are bound to the first core, logic and
 //! the floor's middle to the second. In the regime of one core, all are bound to that core.

@@ -2,7 +2,7 @@
 //! tests' laws.
 //!
 //! ```text
-//! cargo +nightly fuzz run --fuzz-dir tests/fuzz remote /tmp/found
+//! cargo +nightly fuzz run --fuzz-dir tests/fuzz remote /tmp/found services/remote/tests/corpus
 //! ```
 
 #![no_main]

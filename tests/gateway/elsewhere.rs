@@ -273,6 +273,62 @@ fn a_recording_from_afar_has_each_gap_marked_and_the_sum_is_the_truth() {
     domain.assert_clean();
 }
 
+/// At random some recordings would miss what was published before they began.
+#[test]
+fn twenty_recordings_have_the_map_that_was_sent_before_they_began() {
+    const AT_ONCE: usize = 5;
+    let domain = Domain::new();
+    let endpoint = format!("tcp/{}", free());
+    let up = robot(&domain, &endpoint);
+    // A robot that stands finds no way blocked, so nobody sends the map again.
+    domain.done(&["stop"]);
+    domain.done(&["topic", "echo", "nav/map", "--count", "1"]);
+    // How many samples of each topic have come so far.
+    let counts = |recording: &Running| -> BTreeMap<String, u64> {
+        let last = told(recording).pop().unwrap_or_default();
+        let topics = last["topics"].as_array().into_iter().flatten();
+        let count = |topic: &Value| {
+            let name = topic["topic"].as_str().expect("a name").to_owned();
+            (name, topic["received"].as_u64().expect("a number"))
+        };
+        topics.map(count).collect()
+    };
+    let record = |file: &str, more: &[&str]| {
+        domain.start(&[&["bag", "--json", "record", file], more].concat())
+    };
+    let mut near = record("near.mcap", &[]);
+    let names = wait_for("the topics of the bus", || {
+        let counts = counts(&near);
+        (counts.get("nav/map") == Some(&1)).then(|| counts.into_keys().collect::<Vec<_>>())
+    });
+    for round in 0..4 {
+        let begin = |number| {
+            let file = format!("far-{round}-{number}.mcap");
+            (record(&file, &["--remote", &endpoint]), file)
+        };
+        let recordings: Vec<_> = (0..AT_ONCE).map(begin).collect();
+        for (mut recording, file) in recordings {
+            wait_for("the map, and every topic", || {
+                let counts = counts(&recording);
+                let has_map = counts.get("nav/map") == Some(&1);
+                (has_map && counts.into_keys().eq(names.iter().cloned())).then_some(())
+            });
+            recording.signal(Signal::INT);
+            assert_eq!(recording.wait(), Some(0), "{}", recording.log());
+            let info = lines(&domain.run(&["bag", "info", &file, "--json"])).remove(0);
+            let mut topics = info["topics"].as_array().expect("a list").iter();
+            let map = topics.find(|topic| topic["topic"] == "nav/map");
+            assert_eq!(map.expect("the map")["received"], 1, "{file}: {info}");
+        }
+    }
+    near.signal(Signal::INT);
+    assert_eq!(near.wait(), Some(0), "{}", near.log());
+    // A stop in force would outlive the robot.
+    domain.done(&["resume"]);
+    drop(up);
+    domain.assert_clean();
+}
+
 #[test]
 fn figures_and_views_of_a_robot_elsewhere_are_those_of_its_own_gateway() {
     let domain = Domain::new();

@@ -136,6 +136,16 @@ fn the_tools_say_the_same_from_afar_as_on_the_bus() {
 
 /// More than fits between a gateway and a listener that reads nothing: queues and both sockets.
 const MUCH: u64 = 24 << 20;
+/// The most that a gateway may keep for such a listener.
+const KEPT: u64 = MUCH / 3;
+
+/// The memory of a process, in bytes.
+fn memory(of: &Running) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{}/status", of.pid())).expect("a process");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let kib = line.and_then(|line| line.trim().strip_suffix(" kB"));
+    1_024 * kib.expect("memory").parse::<u64>().expect("a number")
+}
 
 #[test]
 fn a_listener_that_sleeps_slows_nobody_and_knows_afterwards_what_it_missed() {
@@ -170,7 +180,8 @@ fn a_listener_that_sleeps_slows_nobody_and_knows_afterwards_what_it_missed() {
         numbers(&mut awake).contains(&(sent - 1)).then_some(())
     });
     kill_process(pid(asleep.pid()), Signal::STOP).expect("a living process");
-    let mut bytes = 0;
+    let before = memory(&gateway);
+    let (mut bytes, mut most) = (0, before);
     while bytes < MUCH {
         let next = sent;
         for _ in 0..32 {
@@ -185,7 +196,11 @@ fn a_listener_that_sleeps_slows_nobody_and_knows_afterwards_what_it_missed() {
             expected.is_empty().then_some(())
         });
         bytes += 32 * size_of::<Much>() as u64;
+        most = most.max(memory(&gateway));
     }
+    let kept = most - before;
+    println!("the gateway kept {} KiB for it", kept >> 10);
+    assert!(kept < KEPT, "{kept} of {bytes} bytes wait for the sleeper");
     let account = awake.account();
     assert_eq!(account.missing(), 0, "{account:?}");
     kill_process(pid(asleep.pid()), Signal::CONT).expect("a living process");

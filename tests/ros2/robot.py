@@ -1,6 +1,7 @@
 """A simulated robot with its node of ROS 2, each test's own; and programs of ROS 2 beside it."""
 
 import atexit
+import glob
 import json
 import os
 import re
@@ -103,10 +104,11 @@ class Robot:
         assert ran.returncode == 0, ran.stderr
         return ran.stdout
 
-    def gateway(self, domain, *flags, env=None):
-        """Starts its node, and returns that once others can find it."""
+    def gateway(self, domain, *flags, env=None, before=()):
+        """Starts its node, after the words of a command that are `before`, and returns that once others can
+        find it."""
         flags = ["--domain", domain, *flags] if domain is not None else flags
-        gateway = Process([*self.lager, "gateway", "--ros2", *flags], env)
+        gateway = Process([*before, *self.lager, "gateway", "--ros2", *flags], env)
         gateway.line("is the node")
         self.gateways.append(gateway)
         return gateway
@@ -115,6 +117,10 @@ class Robot:
         for gateway in self.gateways:
             gateway.end()
         self.up.end()
+        # The transport leaves a small segment of each bus, whose name begins with a number of its folder.
+        prefix = re.search(r'^prefix = "(lager_.+)"$', self.run("config", "--iceoryx2"), re.MULTILINE)
+        for segment in glob.glob(f"/dev/shm/{prefix.group(1)}*"):
+            os.remove(segment)
         for folder in (self.folder, self.state):
             shutil.rmtree(folder, ignore_errors=True)
 

@@ -76,10 +76,10 @@ impl Setup {
     }
 }
 
-/// Hears the parent's message, takes its core and priority, and opens the bus.
+/// Hears the parent's message, takes its core and priority if it is on the path, and opens the bus.
 fn told(parent: &mut Parent, role: Role) -> Result<(Setup, Bus), Box<dyn Error>> {
     let setup: Setup = parent.told()?;
-    if role != Role::Observer {
+    if matches!(role, Role::Bridge | Role::Logic) {
         setup.place.take()?;
     }
     let bus = setup.open(role)?;
@@ -160,15 +160,19 @@ fn gateway(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     Ok(gateway.run(&bus, None, &lager_wake::Watchdog::default(), &never)?)
 }
 
-/// A listener: it gets every sample of every topic.
+/// A listener: it gets every sample of every topic. Its processor time would be another machine's,
+/// so it takes only what nobody else of this one wants.
 #[cfg(feature = "zenoh")]
 fn listener(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     use lager_remote::{Endpoint, Remote};
+    use lager_rig::schedule::schedule;
 
     /// As the tools look.
     const LOOK: Duration = Duration::from_millis(5);
 
     let setup: Setup = parent.told()?;
+    // Zenoh's threads inherit it.
+    schedule(libc::SCHED_IDLE)?;
     let robot = bus_at(&setup.folder).unit;
     let endpoint = Endpoint::Unix(setup.socket);
     let start = std::time::Instant::now();
