@@ -39,6 +39,8 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("lager-home", &["lager-sample"]),
     ("lager-wake", &["lager-home", "lager-sample"]),
+    // It knows frames and threads, and no topic.
+    ("lager-tracer", &["lager-home"]),
     ("lager-ports", &["lager-home", "lager-sample", "lager-wake"]),
     // To stop the robot needs no bus.
     (
@@ -250,6 +252,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-sample",
             "lager-stop",
             "lager-topics",
+            "lager-tracer",
             "lager-wake",
             "lager-wire",
         ],
@@ -281,6 +284,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-station",
             "lager-stop",
             "lager-topics",
+            "lager-tracer",
             "lager-wake",
             "lager-wire",
         ],
