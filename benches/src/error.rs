@@ -37,6 +37,9 @@ pub enum BenchError {
     /// The bus or bare iceoryx2 failed, with its own message.
     #[error("{0}; check that /dev/shm exists, is writable and is not full")]
     Bus(String),
+    /// The kernel gives out no more events.
+    #[error(transparent)]
+    NoTracing(#[from] lager_tracer::NoTracing),
     /// There is no folder for the measurement's bus.
     #[error(transparent)]
     NoPlace(#[from] NoPlace),

@@ -38,7 +38,7 @@ mod watch;
 pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session};
 pub use lager_rig::{Domain, heed_interrupts, interrupted};
-pub use path::may_have_real_time;
+pub use path::{Explained, Wanted, explain, may_have_real_time};
 pub use report::{Load, Mode, Options, Pace, Ratio, Regime, Report, Row};
 pub use rounds::{Rate, Run, Taken};
 pub use sample::SIZES;

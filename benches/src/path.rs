@@ -34,6 +34,7 @@
 //! **Cores**: the boards, the bridge and the floor's ends are bound to the first core, logic and
 //! the floor's middle to the second. In the regime of one core, all are bound to that core.
 
+mod explain;
 mod floor;
 mod processes;
 mod robot;
@@ -54,6 +55,7 @@ use lager_machine::Cores;
 use robot::{Places, Robot};
 use turn::{Chain, TURN, turn};
 
+pub use explain::{Explained, Wanted, explain};
 pub(crate) use floor::PROCESSES as FLOOR_PROCESSES;
 pub(crate) use services::PROCESSES;
 

@@ -40,6 +40,8 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("lager-home", &["lager-sample"]),
     ("lager-wake", &["lager-home", "lager-sample"]),
+    // It knows frames and threads, and no topic.
+    ("lager-tracer", &["lager-home"]),
     ("lager-ports", &["lager-home", "lager-sample", "lager-wake"]),
     // To stop the robot needs no bus.
     (
@@ -253,6 +255,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-sample",
             "lager-stop",
             "lager-topics",
+            "lager-tracer",
             "lager-wake",
             "lager-wire",
         ],
@@ -285,6 +288,7 @@ pub(crate) const MAY_USE: &[(&str, &[&str])] = &[
             "lager-station",
             "lager-stop",
             "lager-topics",
+            "lager-tracer",
             "lager-wake",
             "lager-wire",
         ],

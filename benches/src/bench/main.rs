@@ -15,7 +15,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::builder::PossibleValue;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
@@ -23,7 +23,8 @@ use lager_benches::chip::{self, Programs};
 use lager_benches::compare::Comparison;
 use lager_benches::saved::Saved;
 use lager_benches::{
-    Load, Mode, Options, Pace, Regime, Report, SIZES, Scenario as Timed, at_least_one,
+    Explained, Load, Mode, Options, Pace, Regime, Report, SIZES, Scenario as Timed, Wanted,
+    at_least_one, explain,
 };
 use serde::Serialize;
 
@@ -39,6 +40,7 @@ use serde::Serialize;
   lager bench hop --size 65536 --rate 100 --wait block
                                                    your size, your rate
   lager bench path --runs 9 --json > path.json     for `benches/plot`
+  lager bench path --explain 200us --trace late.json    why frames were late
   lager bench fanout                               the writer's time for observers
   lager bench chip                                 the boards' images, in exact cycles
   lager bench stop                                 200 stops at full speed; --runs N for N
@@ -96,6 +98,17 @@ struct BenchArgs {
     /// NAME.hlog, HdrHistogram's log format (`hop`, `path`, `fanout`)
     #[arg(long, value_name = "NAME")]
     out: Option<PathBuf>,
+    /// Say why frames took longer than this, by the kernel's events around each: an interrupt,
+    /// another thread, a sleeping core, a hypervisor, a page fault, our own code (`path`); needs
+    /// root, and says less without
+    #[arg(long, value_name = "TIME", value_parser = lager_tracer::limit)]
+    explain: Option<u64>,
+    /// With --explain, bridge, logic and boards run in real time
+    #[arg(long, requires = "explain")]
+    realtime: bool,
+    /// With --explain, draw the latest frames into a file that ui.perfetto.dev opens
+    #[arg(long, value_name = "FILE", requires = "explain")]
+    trace: Option<PathBuf>,
     /// How the receiver waits [default: all]
     #[arg(long, value_name = "MODE", value_delimiter = ',')]
     wait: Vec<Mode>,
@@ -258,6 +271,12 @@ impl BenchArgs {
         let varies = varies || self.size.is_some() || self.observers.is_some();
         let varies = varies || self.load.is_some();
         let sentence = match self.scenario() {
+            scenario if self.explain.is_some() && scenario != Scenario::Path => {
+                "only the late frames of `path` are explained"
+            }
+            _ if self.explain.is_some() && self.out.is_some() => {
+                "--out saves a measurement, and --explain is none: --json prints its verdicts"
+            }
             Scenario::Path if self.rate.is_some() => {
                 "the path's frames come at 1 kHz, as its robot needs them; only `hop` takes --rate"
             }
@@ -292,6 +311,22 @@ impl BenchArgs {
         printed(self.json, report)
     }
 
+    /// Explains late frames, and draws them if that is asked for.
+    fn explained(&self, limit_ns: u64) -> Result<String> {
+        let realtime = self.realtime;
+        let wanted = Wanted { limit_ns, realtime };
+        let explained: Explained = explain(&options(self), wanted)?;
+        if let Some(file) = &self.trace {
+            let drawn = explained.draw(file);
+            let drawn = drawn.with_context(|| format!("cannot write {}", file.display()))?;
+            match drawn {
+                true => eprintln!("drawn in {}; ui.perfetto.dev opens it", file.display()),
+                false => eprintln!("nothing to draw without the kernel's events"),
+            }
+        }
+        self.printed(&explained)
+    }
+
     /// Measures, and saves the result if that is asked for.
     fn timed(&self, scenario: Timed) -> Result<String> {
         let report = scenario.measure(&options(self))?;
@@ -323,7 +358,10 @@ fn run(args: &BenchArgs) -> Result<String> {
     let times = args.runs.unwrap_or(usual[usize::from(!args.quick)]);
     match args.scenario() {
         Scenario::Hop => args.timed(Timed::Hop),
-        Scenario::Path => args.timed(Timed::Path),
+        Scenario::Path => match args.explain {
+            Some(limit_ns) => args.explained(limit_ns),
+            None => args.timed(Timed::Path),
+        },
         Scenario::Fanout => args.timed(Timed::Fanout),
         Scenario::Chip => args.printed(&chip::measure(programs()?)?),
         Scenario::Stop => args.printed(&stop::measure(times)?),

@@ -91,6 +91,12 @@ impl Processes {
         }
     }
 
+    /// The two services' process ids, bridge and logic.
+    pub(super) fn services(&self) -> [u32; 2] {
+        // Logic starts first.
+        [self.processes[1].pid(), self.processes[0].pid()]
+    }
+
     fn signal(&self, signal: Signal) {
         for process in &self.processes {
             process.signal(signal);

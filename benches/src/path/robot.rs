@@ -71,7 +71,7 @@ pub(super) struct Robot {
     /// The times of the counted frames whose command was overtaken, in ns.
     overtaken: Vec<u64>,
     operator: Outset,
-    _bus: Bus,
+    bus: Bus,
     _domain: Domain,
 }
 
@@ -125,7 +125,7 @@ impl Robot {
             counts: false,
             overtaken: Vec::new(),
             operator: Outset::new(&bus).map_err(no_bus)?,
-            _bus: bus,
+            bus,
             _domain: domain,
         };
         robot.set_out()?;
@@ -147,6 +147,11 @@ impl Robot {
         }
         robot.processes.add(observers);
         Ok(robot)
+    }
+
+    /// The bus, as an operator sees it.
+    pub(super) fn bus(&self) -> &Bus {
+        &self.bus
     }
 
     /// Plays both boards until the robot is on its way; at first both are silent.

@@ -15,17 +15,17 @@ use crate::plan::Plan;
 use crate::rounds::Taken;
 
 /// Time between frames, in ns.
-const PERIOD: u64 = 1_000_000;
+pub(super) const PERIOD: u64 = 1_000_000;
 
 /// The least time from an answer to the next frame, in ns.
-const REST: u64 = PERIOD / 2;
+pub(super) const REST: u64 = PERIOD / 2;
 
 /// The time within each millisecond at which a frame is sent, in ns.
 const PHASE: u64 = 370_000;
 
 /// Frames at the start of a turn that do not count. After them caches, learnt rates and clock
 /// frequencies are as in the middle of a long run.
-const WARM_UP: usize = 50;
+pub(super) const WARM_UP: usize = 50;
 
 /// Frames of a turn that count. They are few, so that a disturbance hits all chains.
 pub(super) const TURN: usize = 250;
