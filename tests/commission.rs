@@ -12,9 +12,7 @@ use lager_orders::{Level, Mode, SwitchKind};
 use lager_plant::{Build, ButtonsBuild, ContactBuild, Ranger};
 use lager_ports::{Bus, Client};
 use lager_tests::{Domain, Running, WATCHDOG, wait_for};
-use lager_topics::{
-    LinkHealth, LogThought, Role, ThoughtKind, WorldAsk, WorldAskKind, WorldRequest,
-};
+use lager_topics::{LinkHealth, Role, WorldAsk, WorldAskKind, WorldRequest};
 use person::{Person, let_logic_drive};
 use rustix::process::Signal;
 

@@ -153,13 +153,7 @@ pub(crate) fn watched(regime: Regime, options: &Options) -> Option<Group> {
     wanted.then(|| group("path@watched", regime, options, rows, true))
 }
 
-fn group(
-    what: &str,
-    regime: Regime,
-    options: &Options,
-    rows: Rows,
-    observed: bool,
-) -> Group {
+fn group(what: &str, regime: Regime, options: &Options, rows: Rows, observed: bool) -> Group {
     let cores = options.cores;
     Group {
         what: what.to_owned(),

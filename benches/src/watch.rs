@@ -67,6 +67,9 @@ struct Job {
     timed: Timed,
 }
 
+/// Its observers are threads of the second side, not processes.
+impl pair::Work for Job {}
+
 /// The rows with so many watchers.
 fn rows(observers: usize) -> [(Entry, Job); 4] {
     const ALONE: &[&str] = &["lager/actor alone"];
