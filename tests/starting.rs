@@ -290,7 +290,7 @@ fn real_boards_start_again_with_the_description_that_is_saved_and_stand_until_th
     let described = seen.description();
     let file = scene.domain.bus_folder().join(".state/r1/robot.toml");
     // A description that cannot be used changes nothing, but the robot stands.
-    fs::write(&file, "[wheels]\nduty = 0\n").expect("a file");
+    fs::write(&file, "wheels = 3\n").expect("a file");
     drop(seen);
     let refused = scene.domain.start(&restart);
     says(&up, "goes on with what it had");
