@@ -288,7 +288,7 @@ fn real_boards_start_again_with_the_description_that_is_saved_and_stand_until_th
         (truth.left_duty > 0).then_some(())
     });
     let described = seen.description();
-    let file = scene.domain.bus_folder().join(".state/r1/robot.toml");
+    let file = scene.domain.folder().join("described.toml");
     // A description that cannot be used changes nothing, but the robot stands.
     fs::write(&file, "wheels = 3\n").expect("a file");
     drop(seen);
