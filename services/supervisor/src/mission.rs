@@ -9,7 +9,7 @@
 //! ```
 //! Either way it is watched here. A product counts as delivered when logic says so. The robot is
 //! put into autonomous mode at the beginning, unless somebody has set its mode before; from then on
-//! that is a person's. In another world it begins anew, though the mission of before is given up.
+//! that is a person's. A robot that is started again begins anew, and the mission of before is given up.
 //!
 //! A process that takes a mission over from a killed one starts from its [`Mission`]: an order that
 //! logic has not shown yet is given again under its number, which logic takes for a repeat.

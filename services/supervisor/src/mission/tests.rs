@@ -91,7 +91,7 @@ fn a_person_who_has_set_the_mode_before_the_mission_began_keeps_it() {
 }
 
 #[test]
-fn in_another_world_the_robot_begins_anew_and_the_mission_of_before_is_given_up() {
+fn a_robot_that_starts_again_begins_anew_and_the_mission_of_before_is_given_up() {
     let mut mission = Mission::of_robot(&[3], 1);
     mission.begun = true;
     mission.begin_again("it starts again");
@@ -105,7 +105,7 @@ fn in_another_world_the_robot_begins_anew_and_the_mission_of_before_is_given_up(
         assert!(watch.step(seconds(second), &ready).is_none());
     }
     let outcome = watch.mission().outcome();
-    assert_eq!(outcome, Some(Err("it is in another warehouse")));
+    assert_eq!(outcome, Some(Err("it starts again")));
 }
 
 #[test]
