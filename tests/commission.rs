@@ -83,7 +83,7 @@ fn a_robot_that_nobody_described_is_commissioned_and_delivers_after_a_restart() 
         let output = log.output();
         let mut lines = output.lines();
         lines
-            .find(|line| line.contains("set_up_in_terminal") && line.contains(&who))
+            .find(|line| line.contains("SetUpInTerminal") && line.contains(&who))
             .map(drop)
     });
     drop((person, log, bus));

@@ -143,7 +143,7 @@ fn a_robot_that_nobody_described_is_set_up_by_clicks_and_delivers() {
     let page = &mut person.page;
     page.wait_for("#commission .question", "robot.toml has it");
     wait_for("the log to name who has set it up", || {
-        log.output().contains("set_up_at_page").then_some(())
+        log.output().contains("SetUpAtPage").then_some(())
     });
     drop(log);
     page.wait_for("#commission .steps", "A full turn takes");
