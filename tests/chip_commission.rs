@@ -2,7 +2,8 @@
 //! and deliver after a restart. `tests/run` builds the emulator and the images first.
 //!
 //! Two emulated chips are about as fast as real ones, so one robot takes some minutes. The first
-//! `LAGER_CHIP_SEEDS` robots are commissioned, 1 unless that says more.
+//! `LAGER_CHIP_SEEDS` robots are commissioned, 1 unless that says more; `LAGER_CHIP_SEEDS=4..10` begins
+//! with the fourth.
 
 #[path = "commission/person.rs"]
 mod person;
@@ -98,9 +99,10 @@ fn commission(seed: u64) {
 
 #[test]
 fn robots_on_their_real_images_are_commissioned_and_deliver() {
-    let seeds =
-        std::env::var("LAGER_CHIP_SEEDS").map_or(1, |seeds| seeds.parse().expect("a number"));
-    for seed in 1..=seeds {
+    let seeds = std::env::var("LAGER_CHIP_SEEDS").unwrap_or_else(|_| "1".into());
+    let (first, last) = seeds.split_once("..").unwrap_or(("1", &seeds));
+    let [first, last] = [first, last].map(|seed| seed.parse::<u64>().expect("a number"));
+    for seed in first..=last {
         let begun = Instant::now();
         commission(seed);
         println!("seed {seed}: {} s", begun.elapsed().as_secs());
