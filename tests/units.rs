@@ -7,8 +7,8 @@ use std::process::Command;
 use lager_tests::{Domain, in_tree, lager};
 
 const UNITS: [&str; 2] = ["lager.service", "lager-station.service"];
-/// The screen, which only looks.
-const SCREEN: &str = "lager-kiosk.service";
+/// The screen and the node of ROS 2, which only look.
+const OBSERVERS: [&str; 2] = ["lager-kiosk.service", "lager-ros2.service"];
 
 /// The most that `systemd-analyze security` may say of a unit, in tenths.
 const EXPOSED: &str = "--threshold=29";
@@ -22,7 +22,7 @@ fn packaged(file: &str) -> String {
 #[ignore = "needs systemd-analyze; `tests/run` runs it where it is there"]
 fn systemd_takes_the_units_and_calls_them_safe() {
     let domain = Domain::among_others();
-    for unit in UNITS.into_iter().chain([SCREEN]) {
+    for unit in UNITS.into_iter().chain(OBSERVERS) {
         let program = lager();
         let text = packaged(unit);
         let installed = "/usr/bin/lager ";
