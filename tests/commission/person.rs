@@ -146,13 +146,17 @@ impl Person {
             Question::JointMoves => {
                 let (joint, grows) = self.joint.expect("it is named");
                 let before = self.hands.seen.servo_position[joint.servo()];
-                self.press();
-                if self.question().is_some() {
-                    // The step has begun anew: a busy machine was late with an order.
+                // Whoever sees nothing move presses again.
+                let after = wait_for("the joint to move, or its step to begin anew", || {
+                    self.press();
+                    let after = self.hands.seen.servo_position[joint.servo()];
+                    let is_asked_anew = self.question().is_some();
+                    (is_asked_anew || after != before).then(|| (!is_asked_anew).then_some(after))
+                });
+                let Some(after) = after else {
+                    // A busy machine was late with an order.
                     return false;
-                }
-                let after = self.hands.seen.servo_position[joint.servo()];
-                assert_ne!(before, after, "{joint:?}: {:#?}", self.printed);
+                };
                 self.say(if grows == (after > before) {
                     "yes"
                 } else {
