@@ -65,7 +65,7 @@ export const WORDS = {
   log_all: "All", log_stop: "stop", log_help: "help", log_goods: "goods", log_ways: "way", log_persons: "person", log_link: "link", log_battery: "battery", log_settings: "settings",
   log_kinds: "which kinds are shown", log_earlier: "Earlier", log_no_earlier: "The station has kept nothing from before that.",
   did_drive: "{0} drives it", did_arm: "{0} moves its arm",
-  did_commission_begin: "{0} sets it up", did_commission_quit: "{0} sets it up no more", did_commission_undo: "{0} undoes its setting up", did_commission_restart: "{0} has it start again", did_ask: "{0} asks for the wheel", did_keep: "{0} keeps the wheel", did_warehouse: "{0} describes the warehouse anew",
+  did_commission_begin: "{0} sets it up", did_commission_quit: "{0} sets it up no more", did_commission_undo: "{0} undoes its setting up", did_commission_restart: "{0} restarts it", did_ask: "{0} asks for the wheel", did_keep: "{0} keeps the wheel", did_warehouse: "{0} describes the warehouse anew",
   step_begun: "set out", step_asked: "ordered", step_arrived: "arrived", step_picked: "picked", step_carried: "carried", now: "now", order_to: "to delivery", order_from: "from square {0} to delivery", goods_numbered: "goods {0}",
   queue_head: "Next: {0} of {1} goods", queue: "orders that wait: drag a row, or press Alt with an arrow on it; Delete takes it out", turn: "number {0} of {1}", by: "by {0}", put_off_way: "put off: no way there", put_off_battery: "put off: battery low",
   search: "Fetch: number or name", search_none: "no goods are called so", search_one: "Enter fetches {0}", search_many: "several goods match: {0}",

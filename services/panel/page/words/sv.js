@@ -66,7 +66,7 @@ export const WORDS = {
   log_all: "Allt", log_stop: "stopp", log_help: "hjälp", log_goods: "varor", log_ways: "väg", log_persons: "person", log_link: "länk", log_battery: "batteri", log_settings: "inställning",
   log_kinds: "vilka slag som visas", log_earlier: "Tidigare", log_no_earlier: "Stationen har inte sparat något från tiden före det.",
   did_drive: "{0} kör den", did_arm: "{0} rör dess arm",
-  did_commission_begin: "{0} ställer in den", did_commission_quit: "{0} slutar ställa in den", did_commission_undo: "{0} ångrar inställningen", did_commission_restart: "{0} låter den starta om", did_ask: "{0} ber om ratten", did_keep: "{0} behåller ratten", did_warehouse: "{0} beskriver lagret på nytt",
+  did_commission_begin: "{0} ställer in den", did_commission_quit: "{0} slutar ställa in den", did_commission_undo: "{0} ångrar inställningen", did_commission_restart: "{0} startar om den", did_ask: "{0} ber om ratten", did_keep: "{0} behåller ratten", did_warehouse: "{0} beskriver lagret på nytt",
   step_begun: "ivägkörd", step_asked: "beställd", step_arrived: "framme", step_picked: "plockad", step_carried: "bärs", now: "nu", order_to: "till leveransen", order_from: "från ruta {0} till leveransen", goods_numbered: "vara {0}",
   queue_head: "Näst: {0} av {1} varor", queue: "order som väntar: dra en rad, eller tryck Alt och en pil på den; Delete tar bort den", turn: "nummer {0} av {1}", by: "av {0}", put_off_way: "uppskjuten: ingen väg dit", put_off_battery: "uppskjuten: svagt batteri",
   search: "Hämta: nummer eller namn", search_none: "ingen vara heter så", search_one: "Enter hämtar {0}", search_many: "flera varor passar: {0}",
