@@ -57,8 +57,7 @@ fn a_robot_that_gets_another_world_stands_whatever_happens_meanwhile() {
     renew(&up);
     wait_for("the reason", || {
         let told = up.output();
-        told.contains("the robot stays in its warehouse: ")
-            .then_some(())
+        told.contains("goes on with what it had: ").then_some(())
     });
     let first = stop_of(&domain).expect("it is stopped");
     assert_eq!(
@@ -121,7 +120,7 @@ fn a_robot_that_cannot_get_another_world_is_stopped_and_says_why() {
     renew(&up);
     wait_for("the reason", || {
         up.output()
-            .contains("the robot stays in its warehouse: ")
+            .contains("goes on with what it had: ")
             .then_some(())
     });
     assert!(stop_of(&domain).is_some());
