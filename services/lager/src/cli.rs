@@ -12,7 +12,6 @@ mod report;
 mod simulate;
 mod top;
 mod topic;
-mod trace;
 mod values;
 
 use std::ffi::OsString;
@@ -37,7 +36,6 @@ pub use report::ReportArgs;
 pub use simulate::SimulateArgs;
 pub use top::TopArgs;
 pub use topic::{TopicArgs, TopicCommand};
-pub use trace::TraceArgs;
 pub use values::{Fetch, at_speed};
 
 use crate::config::{Body, flag};
@@ -135,8 +133,6 @@ pub enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
-    /// Say why frames of a running robot are late, by the kernel's events around each; needs root
-    Trace(TraceArgs),
     /// Drive the wheels in manual mode, until the command is done or until Ctrl-C
     #[command(
         after_help = "COMMAND is a name (stop, forward, follow-forward, backward, follow-backward, left, right, left-diag, right-diag) or a code 1..9 as 8 binary digits, decimal or 0x-hex."

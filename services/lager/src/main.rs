@@ -41,7 +41,6 @@ mod stop;
 mod time_limit;
 mod top;
 mod topic;
-mod trace;
 mod traces;
 mod up;
 
@@ -295,9 +294,6 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         Command::Manual { folder } => {
             shell::manual(&folder)?;
             return Ok(ExitCode::SUCCESS);
-        }
-        Command::Trace(args) => {
-            trace::run(&config, &args, &TimeLimit::in_order(&config, &shutdown)?)?
         }
         Command::Bag(args) => return bag::run(&config, args, &shutdown),
         Command::Bench { arguments } => {

@@ -18,7 +18,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
         &["stop", "resume", "drive", "gag"],
     ),
     ("Look at it", &["top", "topic", "bag"]),
-    ("Measure", &["bench", "trace"]),
+    ("Measure", &["bench"]),
     (
         "Set up and mend",
         &[
