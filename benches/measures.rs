@@ -63,7 +63,7 @@ fn a_hop_yields_every_row_once() {
         .filter(|row| row.what == "hop")
         .map(lager_benches::Row::label)
         .collect();
-    let expected = "lager iceoryx2/event futex eventfd pipe uds tcp";
+    let expected = "lager lager/watcher iceoryx2/event futex eventfd pipe uds tcp";
     let zenoh = if cfg!(feature = "zenoh") {
         " zenoh"
     } else {

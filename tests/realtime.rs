@@ -211,9 +211,10 @@ fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
                 .next()
                 .and_then(|kib| kib.parse().ok())
                 .expect("a size in kB");
-            // Not more than the limit that the documentation tells people to allow.
+            // The documentation tells people to allow 64 MiB. The program of the tests, with all
+            // features and for debugging, has more in it than theirs, which locks 23 MiB.
             assert!(
-                (1..=64 << 10).contains(&kib),
+                (1..=68 << 10).contains(&kib),
                 "{service} in life {life}: {locked}"
             );
         }
