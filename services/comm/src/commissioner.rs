@@ -50,7 +50,7 @@ pub(crate) struct Process {
 }
 
 impl Process {
-    /// Starts it, with another flag. Each of its lines rings.
+    /// Starts it with this flag behind its arguments. Each of its lines rings.
     ///
     /// # Errors
     /// The system gives no process, pipe or thread.

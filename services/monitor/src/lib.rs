@@ -9,9 +9,9 @@
 //! another computer. The tools are the same.
 //!
 //! All tools but `pub` are observers: they poll, or are woken when everybody else has the sample
-//! (`echo`, `delay`; `wakeful.rs`). They hold no listener and never slow the path. They know no topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`.
-//! The table leads from a name to its static type. A topic that is not in the table carries its own
-//! description. Each tool writes text, or one JSON value in each line, and says how many samples it
+//! (`echo`, `delay`; `wakeful.rs`). They hold no listener and never slow the path. They know no topic,
+//! except for the sentences of some samples (`sentence.rs`) and the head of `top`. The table leads from
+//! a name to its static type. A topic that is not in the table carries its own description. Each tool writes text, or one JSON value in each line, and says how many samples it
 //! lost. A watchdog guards every call into the bus, so a tool reports a bus that does not answer,
 //! and does not wait for it.
 

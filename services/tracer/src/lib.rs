@@ -22,7 +22,6 @@
 pub mod blame;
 mod chrome;
 pub mod event;
-pub mod follow;
 pub mod format;
 pub mod frame;
 mod limit;
@@ -36,7 +35,6 @@ mod tracefs;
 pub mod walk;
 
 pub use blame::Explainer;
-pub use follow::Services;
 pub use frame::{Cause, Frame, Machine, Mark, Who};
 pub use limit::limit;
 pub use modest::Modest;

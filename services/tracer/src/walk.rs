@@ -68,17 +68,6 @@ impl Piece {
     }
 }
 
-/// A thread's turn: from when it is woken until it sleeps again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
-    /// The thread.
-    pub thread: Thread,
-    /// When it was woken, in ns.
-    pub woken_ns: u64,
-    /// When it left its core to sleep, in ns; `None` if the events do not reach so far.
-    pub ended_ns: Option<u64>,
-}
-
 /// The events around a frame.
 #[derive(Debug)]
 pub struct Window<'a> {
@@ -146,32 +135,6 @@ impl<'a> Window<'a> {
             .filter(|thread| runs(thread))
             .copied()
             .collect()
-    }
-
-    /// The first turn of one of these threads that `waker` began by waking it, from that time on.
-    pub fn woken_by(&mut self, waker: Thread, from_ns: u64, threads: &[Thread]) -> Option<Turn> {
-        let wakes =
-            |event: &&Event| event.at_ns >= from_ns && event.thread == waker && !event.in_interrupt;
-        let woken = self.events.iter().filter(wakes);
-        let (thread, woken_ns) = woken
-            .filter_map(|event| match event.what {
-                What::Waking(thread) => Some((thread, event.at_ns)),
-                _ => None,
-            })
-            .find(|(thread, _)| threads.contains(thread))?;
-        // It may lose its core in between: the turn ends when it sleeps again.
-        let life = self.life(thread).iter();
-        let mut after = life.skip_while(|stay| stay.to_ns <= woken_ns);
-        let mut ran = false;
-        let ended = after.find(|stay| {
-            let was = std::mem::replace(&mut ran, true);
-            was && matches!(stay.how, How::Off { .. })
-        });
-        Some(Turn {
-            thread,
-            woken_ns,
-            ended_ns: ended.map(|stay| stay.from_ns),
-        })
     }
 
     /// The way of a frame that `thread` brought to its end at `to_ns`, back to `from_ns`; the pieces

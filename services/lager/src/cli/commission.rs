@@ -22,10 +22,11 @@ answer is a line:
   quit     ends it; the boards are told what they were told before
 
 The robot moves only after an answer to the question that announces this very movement, and stands at
-the next line that you type. Before the arm loses its strength, you are asked to hold it. A line that was typed before its question counts for nothing. Nothing is
-written before the last question is answered with yes. Then robot.toml has the new description, and
-logic and the buttons use it from the robot's next start on. Where LANG is Swedish, so are the questions. In the
-panel, *Set up a robot* asks the same.")]
+the next line that you type. Before the arm loses its strength, you are asked to hold it. A line that
+was typed before its question counts for nothing. Nothing is written before the last question is
+answered with yes. Then robot.toml has the new description, and logic and the buttons use it from the
+robot's next start on. Where LANG is Swedish, so are the questions. In the panel, *Set up a robot* asks
+the same.")]
 pub struct CommissionArgs {
     /// Put back the description from before the last commissioning; needs no robot
     #[arg(long)]
