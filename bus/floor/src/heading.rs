@@ -48,6 +48,14 @@ impl Spin {
             Self::Right => 1.0,
         }
     }
+
+    /// The opposite way.
+    pub const fn back(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
 }
 
 impl Heading {

@@ -161,6 +161,15 @@ fn tell(line: &Line<'_>, as_json: bool) -> Result<()> {
 /// The Pi's ends of the cables, in the order of the ports.
 const WIRES: [Wire; 2] = [Wire::Sensor, Wire::Steering];
 
+fn bridge_options(config: &Config) -> CoreOptions {
+    CoreOptions {
+        baud: config.serial.baud,
+        raw_line: config.serial.tells_raw_line(),
+        original_boards: config.serial.original_boards,
+        robot: config.robot(),
+    }
+}
+
 /// Robot, bridge, logic and the mission.
 struct Whole {
     now: Duration,
@@ -190,6 +199,9 @@ struct Whole {
     /// What a person finds out about the robot, for the tests that commission it.
     #[cfg(test)]
     wizard: Option<commissioned::Wizard>,
+    /// Nobody takes logic's inputs, for the tests that kill it.
+    #[cfg(test)]
+    logic_is_gone: bool,
 }
 
 impl Whole {
@@ -215,12 +227,6 @@ impl Whole {
         mission: &[i32],
         options: RobotOptions,
     ) -> Result<Self> {
-        let bridge = CoreOptions {
-            baud: config.serial.baud,
-            raw_line: config.serial.tells_raw_line(),
-            original_boards: config.serial.original_boards,
-            robot: config.robot(),
-        };
         let (side, grid, products) = warehouse.told()?;
         let map = WarehouseMap::new(side, grid, &products);
         let mut whole = Self {
@@ -228,7 +234,7 @@ impl Whole {
             robot: Robot::new(warehouse, options)?,
             ears: [Listener::new(0), Listener::new(1)],
             counts: Counts::default(),
-            bridge: BridgeCore::new(bridge, None),
+            bridge: BridgeCore::new(bridge_options(config), None),
             stop: None,
             orders: Vec::new(),
             stirred: true,
@@ -248,6 +254,8 @@ impl Whole {
             tape: taped::Tape::default(),
             #[cfg(test)]
             wizard: None,
+            #[cfg(test)]
+            logic_is_gone: false,
         };
         whole.tell_logic(Input::Map(&map));
         Ok(whole)
@@ -464,6 +472,10 @@ impl Whole {
 
     /// One input for logic. Its events, order and thought go out; nobody here waits for the rest.
     fn tell_logic(&mut self, input: Input<'_>) {
+        #[cfg(test)]
+        if self.logic_is_gone {
+            return;
+        }
         let said = self.navigator.handle(self.now, input);
         let order = self.navigator.current_order();
         for part in self.outgoing.after(self.now, order, &said) {
@@ -527,6 +539,8 @@ mod built;
 mod commissioned;
 #[cfg(test)]
 mod disturbed;
+#[cfg(test)]
+mod killed;
 #[cfg(test)]
 mod obstacles;
 #[cfg(test)]

@@ -190,7 +190,9 @@ payload! {
         pub forced: u8,
         /// Headings that are possible besides `heading` since a turn was disturbed: bit n = n
         /// quarters further to the right; bit 0 = the present turn was disturbed; bit 4 = the
-        /// quarter before ended without tape.
+        /// quarter before ended without tape. In a search for a station's mark, bit 5 = half a turn
+        /// without tape lies behind the last tape; bit 6 = it turns to the right; bit 7 = there is
+        /// no mark.
         pub doubt: u8,
         /// For each of these headings, from one quarter on, the column of the node last passed.
         pub doubt_x: [u8; 3],

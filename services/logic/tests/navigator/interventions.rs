@@ -174,7 +174,7 @@ fn refused_turns_and_drops_are_tried_again() {
 fn a_board_that_refuses_for_ever_is_reported() {
     let mut trial = mission();
     trial.body.refuse = u32::MAX;
-    assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Stuck));
+    assert!(trial.run_until(SECOND * 100, |trial| trial.phase() == Phase::Stuck));
     assert!(
         said(&trial, "does not do what it is asked"),
         "{}",
@@ -374,7 +374,7 @@ fn a_station_out_of_sight_after_a_disturbed_turn_is_a_failure_that_says_so() {
     // A person carries it to a place without tape.
     (trial.body.x, trial.body.y) = (1_000.0, 1_000.0);
     stop(&mut trial, false);
-    assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Stuck));
+    assert!(trial.run_until(SECOND * 100, |trial| trial.phase() == Phase::Stuck));
     let failure = trial.navigator.status().failure;
     assert_eq!(
         failure.kind.get(),
@@ -382,7 +382,7 @@ fn a_station_out_of_sight_after_a_disturbed_turn_is_a_failure_that_says_so() {
         "{failure}"
     );
     assert!(
-        said(&trial, "does not see its mark; turns: 8"),
+        said(&trial, "does not see its mark; turns: 16"),
         "{}",
         trial.story()
     );
