@@ -68,21 +68,14 @@ fn main() -> ExitCode {
             time(&mut benches, &group, rows, *samples)
         }));
         if let Err(panic) = timed {
-            return match failed(panic).seen_by(watch) {
+            let error = failed(panic).seen_by(watch);
+            eprintln!("{error}");
+            match error {
                 // `path@observed`, whose limits the guard then does not judge.
-                error @ BenchError::RealTime(_) => {
-                    eprintln!("{error}");
-                    continue;
-                }
-                error => {
-                    eprintln!("{error}");
-                    ExitCode::from(if matches!(error, BenchError::HeldUp(..)) {
-                        HELD_UP
-                    } else {
-                        1
-                    })
-                }
-            };
+                BenchError::RealTime(_) => {}
+                BenchError::HeldUp(..) => return ExitCode::from(HELD_UP),
+                _ => return ExitCode::FAILURE,
+            }
         }
     }
     criterion.final_summary();

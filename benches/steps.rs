@@ -2,7 +2,6 @@
 //! in one group with its baseline. `benches/guard` holds the ratios. `instructions` counts their
 //! instructions, which a busy machine does not change.
 
-use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{BatchSize, Bencher, Criterion, Throughput, criterion_group, criterion_main};
@@ -12,7 +11,7 @@ use lager_benches::steps::{self, Bare, FRAMES, Ports, a_second_of_bytes, a_secon
 /// The CRC of a second's packets, beside which decoding them and what is decided on them is timed.
 fn crc(bencher: &mut Bencher<'_>) {
     let bytes = a_second_of_bytes();
-    bencher.iter(|| black_box(steps::check(&bytes)));
+    bencher.iter(|| steps::check(&bytes));
 }
 
 fn decode(criterion: &mut Criterion) {

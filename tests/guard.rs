@@ -121,23 +121,18 @@ fn a_source_without_limits_is_refused() {
     );
 }
 
-/// The receivers of the measured hops, and the program that measures them, a child of the script.
-fn receivers(guard: u32) -> (Vec<u32>, Option<u32>) {
-    let is_receiver = |process: &u32| {
+/// The logics of the measured robots, and the program that measures them, a child of the script.
+fn logics(guard: u32) -> Option<(Vec<u32>, u32)> {
+    let is_logic = |process: &u32| {
         let variables = fs::read(format!("/proc/{process}/environ")).unwrap_or_default();
-        let name = b"LAGER_PROCESS=receiver of the hop";
+        let name = b"LAGER_PROCESS=path, logic";
         variables.split(|byte| *byte == 0).any(|one| one == name)
     };
-    for program in proc::children(guard) {
-        let found: Vec<u32> = proc::children(program)
-            .into_iter()
-            .filter(is_receiver)
-            .collect();
-        if !found.is_empty() {
-            return (found, Some(program));
-        }
-    }
-    (Vec::new(), None)
+    proc::children(guard).into_iter().find_map(|program| {
+        let children = proc::children(program).into_iter();
+        let found: Vec<u32> = children.filter(is_logic).collect();
+        (!found.is_empty()).then_some((found, program))
+    })
 }
 
 fn signal(process: u32, signal: Signal) {
@@ -146,28 +141,35 @@ fn signal(process: u32, signal: Signal) {
     let _ = kill_process(process, signal);
 }
 
-/// Lets the first hop's receiver not run until the measurement has ended for this reason. Its program
-/// stands for `stands` meanwhile.
-fn freeze_a_receiver(guard: u32, stands: Option<Duration>) {
+/// Lets no logic run until the measurement has ended for this reason. The program that measures stands
+/// still for `stands` meanwhile.
+fn freeze_the_logics(guard: u32, stands: Option<Duration>) {
     let sleep = || std::thread::sleep(Duration::from_millis(5));
     let is_up = || fs::exists(format!("/proc/{guard}")).unwrap_or(false);
-    let (found, program) = loop {
-        match receivers(guard) {
-            (found, Some(program)) => break (found, program),
-            _ if !is_up() => return,
-            _ => sleep(),
+    let tell = |logics: &[u32], what| logics.iter().for_each(|logic| signal(*logic, what));
+    let (frozen, program) = loop {
+        match logics(guard) {
+            Some(found) => break found,
+            None if !is_up() => return,
+            None => sleep(),
         }
     };
-    found
-        .iter()
-        .for_each(|receiver| signal(*receiver, Signal::STOP));
+    tell(&frozen, Signal::STOP);
     if let Some(stands) = stands {
         signal(program, Signal::STOP);
         std::thread::sleep(stands);
         signal(program, Signal::CONT);
     }
-    while receivers(guard).0.iter().any(|one| found.contains(one)) {
+    // A chain whose turn comes is told to run, so it is told again and again.
+    while let Some((now, _)) = logics(guard)
+        && now.iter().any(|logic| frozen.contains(logic))
+    {
+        tell(&now, Signal::STOP);
         sleep();
+    }
+    // Those of the next measurement.
+    if let Some((now, _)) = logics(guard) {
+        tell(&now, Signal::CONT);
     }
 }
 
@@ -178,7 +180,7 @@ const ONCE: [&str; 4] = ["--only", "latency", "--repetitions", "1"];
 fn a_measurement_that_ended_because_the_machine_was_held_up_is_made_again() {
     let said = guard_beside(&ONCE, |guard| {
         // As if another machine had this one's cores.
-        freeze_a_receiver(guard, Some(Duration::from_millis(300)));
+        freeze_the_logics(guard, Some(Duration::from_millis(300)));
     });
     // The machine may really be held up in the second one, and what that measures is not judged here.
     for words in ["that is measured again", "gave a core to nobody here"] {
@@ -189,7 +191,7 @@ fn a_measurement_that_ended_because_the_machine_was_held_up_is_made_again() {
 #[test]
 #[ignore = "as above"]
 fn a_measurement_that_ended_on_a_machine_that_ran_is_not_made_again() {
-    let said = guard_beside(&ONCE, |guard| freeze_a_receiver(guard, None));
+    let said = guard_beside(&ONCE, |guard| freeze_the_logics(guard, None));
     // If this machine was really held up, there is nothing to see.
     if !said.everything.contains("gave a core to nobody here") {
         assert_eq!(said.code, Some(2), "{}", said.everything);

@@ -34,7 +34,7 @@ use crate::limits::Limits;
 #[command(
     name = "benches/guard",
     bin_name = "benches/guard",
-    after_help = "Examples:\n  benches/guard                        everything, about four minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only latency --json\n  benches/guard --only latency --repetitions 20    before a limit is changed"
+    after_help = "Examples:\n  benches/guard                        everything, about five minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only latency --json\n  benches/guard --only latency --repetitions 20    before a limit is changed"
 )]
 struct Arguments {
     /// The limits
