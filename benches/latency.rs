@@ -26,9 +26,19 @@ const HELD_UP: u8 = 75;
 /// Criterion's samples of a row, each of two rounds or more.
 const SAMPLES: usize = 10;
 
-/// The groups: the names in `lager bench`, the rows, how many samples a round has, and how long
-/// criterion measures a row, in ms.
-const GROUPS: &[(&str, Mode, Regime, &[&str], usize, u64)] = {
+/// A group: its names in `lager bench`, its rows, how many samples a round has, and how long criterion
+/// measures a row, in ms.
+type Timed = (
+    &'static str,
+    Mode,
+    Regime,
+    &'static [&'static str],
+    usize,
+    u64,
+);
+
+/// The groups that have limits.
+const GROUPS: &[Timed] = {
     use Mode::{Adaptive, Block, Spin};
     use Regime::{NoHalt, Plain, SameCore};
     &[
@@ -65,7 +75,7 @@ fn main() -> ExitCode {
         let group = group(what, *mode, *regime);
         let watch = Watch::begin();
         let timed = catch_unwind(AssertUnwindSafe(|| {
-            time(&mut benches, &group, rows, *samples)
+            time(&mut benches, &group, rows, *samples);
         }));
         if let Err(panic) = timed {
             let error = failed(panic).seen_by(watch);
