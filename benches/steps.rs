@@ -68,7 +68,7 @@ fn publish(criterion: &mut Criterion) {
         group.bench_function("lager", |bencher| {
             let drain = |ports: &mut Ports| assert!(ports.drain() <= subscribers);
             timed(bencher, Ports::meet(subscribers), drain, |ports| {
-                ports.publish()
+                ports.publish();
             });
         });
         group.bench_function("iceoryx2/header", |bencher| {
