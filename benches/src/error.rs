@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use lager_rig::schedule::{NoRealTime, Unbound};
-use lager_rig::{NoPlace, ProcessError, Refused};
+use lager_rig::{NoPlace, ProcessError, Refused, Watch};
 
 /// Why a measurement ended without a report.
 #[derive(Debug, thiserror::Error)]
@@ -93,9 +93,22 @@ pub enum BenchError {
     Interrupted,
 }
 
+/// From this time on a core was held up. A robot's leases and reports are as long, so it stands.
+const HELD_UP: Duration = Duration::from_millis(100);
+
 impl BenchError {
+    /// The same, or [`BenchError::HeldUp`] if something did not come in time while `watch` saw that
+    /// this machine was held up.
+    #[must_use]
+    pub fn seen_by(self, watch: Watch) -> Self {
+        match self.is_silence().then(|| watch.end()) {
+            Some(held_up) if held_up >= HELD_UP => Self::HeldUp(Box::new(self), held_up),
+            _ => self,
+        }
+    }
+
     /// Whether something did not come in time, as also happens on a machine that is held up.
-    pub(crate) fn is_silence(&self) -> bool {
+    fn is_silence(&self) -> bool {
         matches!(
             self,
             Self::Alone(_)

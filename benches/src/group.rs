@@ -1,24 +1,20 @@
 //! A group of rows that take turns in short rounds within each run. So other work on the machine
 //! hits all rows alike, and a ratio compares figures of one run.
 //!
-//! This file alone defines how a measurement runs: `lager bench` and the guard run whole groups
-//! ([`Group::measure`]), criterion times single rows ([`Group::open`]). The scenario defines a
-//! round; nothing here times a sample.
+//! This file alone defines how a measurement runs: `lager bench` runs whole groups
+//! ([`Group::measure`]), criterion asks for the rounds of a row ([`Group::open`]). The scenario
+//! defines a round; nothing here times a sample.
 
-use core::time::Duration;
 use std::io::{IsTerminal, Write};
 use std::time::Instant;
 
-use lager_rig::{Watch, heed_interrupts, interrupted};
+use lager_rig::{Process, Watch, heed_interrupts, interrupted};
 
 use crate::error::BenchError;
 use crate::machine::kept_awake;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
 use crate::rounds::{Rate, Run, Spread, Taken};
 use crate::stats::{Distribution, median};
-
-/// From this time on a core was held up. A robot's leases and reports are as long, so it stands.
-const HELD_UP: Duration = Duration::from_millis(100);
 
 /// One line of a report before it is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +63,22 @@ pub trait Session {
 /// The result of opening a session.
 pub type Opened = Result<Box<dyn Session>, BenchError>;
 
+/// A session, and the processes that keep the cores from halting as long as it is open.
+struct Awake {
+    session: Box<dyn Session>,
+    _spinners: Vec<Process>,
+}
+
+impl Session for Awake {
+    fn round(&mut self, index: usize, samples: usize) -> Result<Taken, BenchError> {
+        self.session.round(index, samples)
+    }
+
+    fn finish(&mut self, rows: &mut Vec<Row>) -> Result<(), BenchError> {
+        self.session.finish(rows)
+    }
+}
+
 /// Rows that are compared with each other.
 pub struct Group {
     /// See [`Row::what`].
@@ -83,13 +95,15 @@ pub struct Group {
 }
 
 impl Group {
-    /// Starts in this thread the processes that measure it.
+    /// Starts in this thread the processes that measure it, and what keeps the cores from halting.
     ///
     /// # Errors
     /// See [`BenchError`].
     pub fn open(&self) -> Opened {
         heed_interrupts();
-        (self.open)()
+        let _spinners = kept_awake(self.regime)?;
+        let session = (self.open)()?;
+        Ok(Box::new(Awake { session, _spinners }))
     }
 
     /// Measures all entries in a thread of its own, in `options.runs` runs of some rounds. In each
@@ -111,16 +125,11 @@ impl Group {
                 eprintln!("{error}");
                 Ok(Vec::new())
             }
-            Err(error) if error.is_silence() => Err(match watch.end() {
-                held_up if held_up >= HELD_UP => BenchError::HeldUp(Box::new(error), held_up),
-                _ => error,
-            }),
-            measured => measured,
+            measured => measured.map_err(|error| error.seen_by(watch)),
         }
     }
 
     fn open_and_measure(&self, options: &Options) -> Result<Vec<Row>, BenchError> {
-        let _awake = kept_awake(self.regime)?;
         let mut session = self.open()?;
         let mut rows = self.take_turns(options, &mut *session)?;
         session.finish(&mut rows)?;

@@ -1,13 +1,13 @@
 //! The project's measurements, each beside its baseline in the same run.
 //!
-//! A [`Scenario`] is defined once, as groups of rows that take turns ([`Group`]). `lager bench` and
-//! the guard measure whole groups and get a [`Report`], which is printed as a table or as JSON;
-//! criterion times single rows. [`steps`] has the steps of the path within one process, for
-//! criterion and for counting instructions. [`chip`] counts cycles of the boards' images instead;
-//! these are exact and have no baseline.
+//! A [`Scenario`] is defined once, as groups of rows ([`Group`]). `lager bench` measures whole groups,
+//! whose rows take turns, and prints a [`Report`] as a table or as JSON. Criterion times the rows that
+//! have a limit, and the guard judges its estimates. [`steps`] has the steps of the path within one
+//! process, for criterion and for counting instructions. [`chip`] counts cycles of the boards' images
+//! instead; these are exact and have no baseline.
 //!
-//! An absolute time means little on a shared machine. So rows and baselines take turns within one
-//! run, and a report has ratios of one run. Nothing here asserts a time; the guard does.
+//! An absolute time means little on a shared machine. So a row is measured close to its baseline, and
+//! ratios are compared. Nothing here asserts a time; the guard does.
 //!
 //! **Invariant:** every wait of a measurement has a limit, and a measurement leaves nothing behind.
 

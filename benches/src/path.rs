@@ -96,14 +96,17 @@ const ALONE: [(Entry, Beside); 3] = [
     ),
 ];
 
+/// The row in real time with which those with observers are compared.
+const ALONE_IN_REAL_TIME: &str = "lager/alone";
+
 /// A row in real time with nobody beside it, and those that are compared with it.
 fn beside_alone(others: &[(&'static str, Beside)]) -> Rows {
-    let alone = ("lager/alone", Beside::Nobody);
+    let alone = (ALONE_IN_REAL_TIME, Beside::Nobody);
     let rows = [alone].into_iter().chain(others.iter().copied());
     rows.map(|(label, beside)| {
         let against: &[&str] = match beside {
             Beside::Nobody => &[],
-            _ => &["lager/alone"],
+            _ => &[ALONE_IN_REAL_TIME],
         };
         (Entry::new(label, Mode::Block, against), beside)
     })

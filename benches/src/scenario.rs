@@ -1,4 +1,4 @@
-//! The timed measurements by name, for `lager bench` and the guard.
+//! The timed measurements by name, for `lager bench` and for criterion.
 
 use clap::ValueEnum;
 

@@ -1,12 +1,15 @@
 //! Deliberate slow-downs, with which the guard's own test shows that the guard notices them.
 //!
-//! They are in the bench code around calls of `lager-ports`, never in a crate that runs on the
+//! They are in the bench code around calls of what is measured, never in a crate that runs on the
 //! robot. Without the feature `slow-downs` every function here is empty, so the usual figures are
 //! of unchanged code. With it, `LAGER_BENCH_SLOW` chooses one.
 
 use core::sync::atomic::AtomicU32;
 use std::hint::black_box;
 use std::sync::OnceLock;
+
+use lager_sample::Topic as _;
+use lager_topics::SensorLine;
 
 /// The environment variable with the slow-down's name: `allocation` or `system-call`.
 pub const VARIABLE: &str = "LAGER_BENCH_SLOW";
@@ -21,13 +24,21 @@ enum Slow {
     SystemCall,
 }
 
-/// Call it beside each publish on a topic with `observers` observers.
+/// Call it beside each publish.
 #[inline]
-pub fn publish(observers: usize) {
+pub fn publish() {
     match which() {
         Slow::Not => {}
         Slow::Allocation => allocate(),
-        Slow::SystemCall => (0..observers).for_each(|_| wake_nobody()),
+        Slow::SystemCall => wake_nobody(SensorLine::QOS.observers),
+    }
+}
+
+/// Call it beside work of so many steps, for instance to decode as many packets.
+#[inline]
+pub fn work(steps: usize) {
+    if *which() == Slow::SystemCall {
+        wake_nobody(steps);
     }
 }
 
@@ -83,9 +94,11 @@ fn allocate() {
     drop(black_box(Box::new([0_u8; 64])));
 }
 
-/// Makes the system call that a ring of an observer would need even if nobody sleeps.
-fn wake_nobody() {
+/// Makes the system call that a ring of an observer would need even if nobody sleeps, for so many.
+fn wake_nobody(times: usize) {
     static WORD: AtomicU32 = AtomicU32::new(0);
-    // Nobody waits on the word, and the kernel says so.
-    let _ = rustix::thread::futex::wake(&WORD, rustix::thread::futex::Flags::PRIVATE, 1);
+    for _ in 0..times {
+        // Nobody waits on the word, and the kernel says so.
+        let _ = rustix::thread::futex::wake(&WORD, rustix::thread::futex::Flags::PRIVATE, 1);
+    }
 }

@@ -7,21 +7,24 @@
 use core::time::Duration;
 use std::hint::black_box;
 
+use iceoryx2::prelude::ipc;
 use lager_bridge::arbiter::{Arbiter, Verdict};
 use lager_floor::Heading;
 use lager_logic::{Input, LogicConfig, Navigator};
 use lager_orders::Mode;
 use lager_ports::{Bus, Publisher, Subscriber};
 use lager_rig::Domain;
+use lager_sample::{Stamp, Topic};
 use lager_topics::{
     MapProduct, Order, Origin, Phase, Role, SensorLine, SteeringOrder, SteeringReport, WarehouseMap,
 };
 use lager_wake::{Policy, Waiter, Wake};
 use lager_wire::{
-    Centimetres, Decoder, LineState, Packet, PacketId, Payload, SteerCommand, SteerData,
-    SteerFlags, Version,
+    Centimetres, Decoder, LineState, PACKET_LENGTH, Packet, PacketId, Payload, SteerCommand,
+    SteerData, SteerFlags, Version, checksum,
 };
 
+use crate::baseline::iceoryx::{Member, Sender};
 use crate::slow;
 
 /// The packets that the two boards send in one second: line and distance in turn, and the steering
@@ -75,6 +78,14 @@ pub fn decode(bytes: &[u8]) -> usize {
         .iter()
         .filter(|byte| decoder.push(**byte).is_some())
         .count()
+}
+
+/// Makes the CRC of each of these packets, and nothing else. Any decoder must do at least that.
+#[inline(always)]
+pub fn check(bytes: &[u8]) {
+    for packet in black_box(bytes).chunks_exact(PACKET_LENGTH) {
+        black_box(checksum(packet));
+    }
 }
 
 /// Encodes packets of version 1.
@@ -139,7 +150,7 @@ impl Ports {
     pub fn publish(&self) {
         let mut loan = self.publisher.loan().unwrap();
         loan.link_epoch = black_box(7);
-        slow::publish(self.subscribers.len());
+        slow::publish();
         loan.send().unwrap();
     }
 
@@ -161,6 +172,73 @@ impl Ports {
     pub fn drain(&mut self) -> usize {
         let mut received = 0;
         for subscriber in &mut self.subscribers {
+            while subscriber.receive().unwrap().is_some() {
+                received += 1;
+            }
+        }
+        received
+    }
+}
+
+/// The payload of `sensor/line`.
+type Frame = <SensorLine as Topic>::Payload;
+
+/// Bare iceoryx2 in the same place, with the ports' header and limits; nobody is rung.
+pub struct Bare {
+    sender: Sender<Frame, Stamp>,
+    subscribers: Vec<iceoryx2::port::subscriber::Subscriber<ipc::Service, Frame, Stamp>>,
+    _members: [Member; 2],
+    _domain: Domain,
+}
+
+impl Bare {
+    /// As [`Ports::meet`].
+    ///
+    /// # Panics
+    /// When there is no bus.
+    #[must_use]
+    pub fn meet(subscribers: usize) -> Self {
+        const NAME: &str = "bench/bare-step";
+        let domain = Domain::new(crate::FAMILY).expect("a bus");
+        let config = domain.config();
+        let member = || Member::join(&config, Some(SensorLine::QOS)).expect("a node");
+        let [writer, reader] = [member(), member()];
+        let sender = writer.sender(NAME).expect("a topic");
+        let all = (0..subscribers).map(|_| reader.subscriber(NAME).expect("a topic"));
+        let mut bare = Self {
+            sender,
+            subscribers: all.collect(),
+            _members: [writer, reader],
+            _domain: domain,
+        };
+        for _ in 0..100 {
+            bare.publish();
+            assert_eq!(bare.drain(), bare.subscribers.len());
+        }
+        bare
+    }
+
+    /// Publishes a frame.
+    #[inline(always)]
+    pub fn publish(&mut self) {
+        let frame = Frame {
+            link_epoch: black_box(7),
+            ..Frame::default()
+        };
+        self.sender.send(&frame).unwrap();
+    }
+
+    /// Receives a frame as the first subscriber, and returns its memory.
+    #[inline(always)]
+    pub fn receive(&mut self) -> Option<u32> {
+        let sample = self.subscribers[0].receive().unwrap();
+        sample.map(|sample| sample.link_epoch)
+    }
+
+    /// Receives all samples for all subscribers, and returns their number.
+    pub fn drain(&mut self) -> usize {
+        let mut received = 0;
+        for subscriber in &self.subscribers {
             while subscriber.receive().unwrap().is_some() {
                 received += 1;
             }

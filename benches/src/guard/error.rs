@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use lager_benches::{BenchError, Scenario};
+use lager_benches::BenchError;
 
 /// Why the guard could not do its work.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum GuardError {
     #[error("{0} cannot be read ({1})")]
     Unreadable(PathBuf, std::io::Error),
-    /// A file of limits or of counts.
+    /// A file of limits, counts or estimates.
     #[error("{0}: {1}")]
     Unusable(PathBuf, String),
     #[error(
@@ -20,16 +20,14 @@ pub(crate) enum GuardError {
         "`rustc -vV` shows neither version nor target ({0}); put the rustc that built the benches into PATH"
     )]
     Rustc(String),
-    #[error("{0}: {1}")]
-    Scenario(Scenario, BenchError),
     #[error("cycles: {0}")]
     Chip(BenchError),
     #[error("`--only {0}` selects nothing; the sources that have limits are: {1}")]
     NoSuchSource(String, String),
     #[error(
-        "there are no counts of `{0}`; run `benches/guard`, which makes them, or leave them out with --only"
+        "`{0}` was not measured; run `benches/guard`, which does it, or leave it out with --only"
     )]
-    NoCounts(String),
+    NotMeasured(String),
 }
 
 /// The text of a file.

@@ -1,5 +1,6 @@
-//! Compares figures with their limits, as a pure function. A limit without a measured figure is
-//! broken, so the guard notices a renamed bench.
+//! Compares figures with their limits, as a pure function. A ratio breaks its limit if even the
+//! favourable end of its interval does. A limit without a measured figure is broken, so the guard
+//! notices a renamed bench.
 
 use core::fmt;
 
@@ -47,6 +48,8 @@ pub(crate) struct Judgement {
     pub(crate) source: String,
     pub(crate) figure: String,
     pub(crate) measured: Option<f64>,
+    /// Between which ends it lies, if it is a ratio.
+    pub(crate) interval: Option<[f64; 2]>,
     pub(crate) limit: f64,
     /// The figure must be at least the limit, not at most.
     pub(crate) at_least: bool,
@@ -66,7 +69,7 @@ pub(crate) fn judge(limits: &Limits, figures: &Figures) -> (Vec<Judgement>, Vec<
     if counted.is_some() {
         notes.extend(notes_on_counts(limits, figures));
     }
-    notes.extend(figures.unmeasured.values().cloned());
+    notes.extend(figures.no_real_time.clone());
     (judgements, notes)
 }
 
@@ -95,20 +98,23 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
         // A count is a whole number.
         (count * (1.0 + margin_percent / 100.0)).floor()
     });
-    let measured = figures.get(&limit.figure);
+    let measured = figures.values.get(&limit.figure);
     let verdict = match measured {
         None if figures.cannot_be_measured(&limit.figure) => Verdict::NotJudged,
         None => Verdict::Missing,
         Some(_) if margin == Margin::NotJudged => Verdict::NotJudged,
         // NaN matches neither condition, so it breaks the limit.
-        Some(value) if at_least && value >= bound => Verdict::Kept,
-        Some(value) if !at_least && value <= bound => Verdict::Kept,
+        Some([.., high]) if at_least && *high >= bound => Verdict::Kept,
+        Some([low, ..]) if !at_least && *low <= bound => Verdict::Kept,
         Some(_) => Verdict::Broken,
     };
     Judgement {
         source: limit.source.clone(),
         figure: limit.figure.clone(),
-        measured,
+        measured: measured.map(|[_, value, _]| *value),
+        interval: measured
+            .map(|[low, _, high]| [*low, *high])
+            .filter(|[low, high]| low < high),
         limit: bound,
         at_least,
         goal: limit.goal,
@@ -148,7 +154,7 @@ fn notes_on_counts(limits: &Limits, figures: &Figures) -> Vec<String> {
     const LOOSE: f64 = 0.9;
     let source = &figures.source;
     let note = |name: &String| {
-        let value = figures.get(name)?;
+        let [value, ..] = figures.values[name];
         match limits.of(source).find(|limit| limit.figure == *name) {
             None => Some(format!("{source}: `{name}` ({value}) has no limit")),
             Some(limit) if value < limit.measured.unwrap_or(0.0) * LOOSE => Some(format!(
@@ -157,16 +163,16 @@ fn notes_on_counts(limits: &Limits, figures: &Figures) -> Vec<String> {
             Some(_) => None,
         }
     };
-    figures.runs.keys().filter_map(note).collect()
+    figures.values.keys().filter_map(note).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figures::{Built, CYCLES};
+    use crate::figures::{Built, CYCLES, Interval, LATENCY};
     use std::path::Path;
 
-    const RATIO: &str = "hop spin plain: lager / futex p50";
+    const RATIO: &str = "latency/hop/spin/plain: lager / futex";
 
     fn limits(of_send: &str) -> Limits {
         let text = format!(
@@ -176,7 +182,7 @@ mod tests {
              margin_percent = 5
              margin_percent_other_rustc = 20
              [[limit]]
-             source = 'hop'
+             source = 'latency'
              figure = '{RATIO}'
              at_most = 1.2
              reason = 'because'
@@ -194,7 +200,7 @@ mod tests {
         limits: &Limits,
         source: &str,
         built: &str,
-        figure: (&str, f64),
+        figure: (&str, Interval),
     ) -> (Verdict, String) {
         let built = built.split_once(' ').map(|(rustc, target)| Built {
             rustc: rustc.to_owned(),
@@ -203,7 +209,7 @@ mod tests {
         let figures = Figures {
             source: source.to_owned(),
             built,
-            runs: [(figure.0.to_owned(), vec![figure.1])].into(),
+            values: [(figure.0.to_owned(), figure.1)].into(),
             ..Figures::default()
         };
         let (judgements, notes) = judge(limits, &figures);
@@ -212,14 +218,15 @@ mod tests {
     }
 
     #[test]
-    fn a_ratio_is_kept_up_to_its_limit() {
-        for (value, expected) in [
+    fn a_ratio_breaks_its_limit_if_even_the_favourable_end_does() {
+        for (low, expected) in [
             (1.2, Verdict::Kept),
             (1.21, Verdict::Broken),
             (f64::NAN, Verdict::Broken),
         ] {
-            let (verdict, notes) = judged(&limits("measured = 1"), "hop", "", (RATIO, value));
-            assert_eq!((verdict, notes.as_str()), (expected, ""), "{value}");
+            let ratio = (RATIO, [low, 1.3, 1.4]);
+            let (verdict, notes) = judged(&limits("measured = 1"), LATENCY, "", ratio);
+            assert_eq!((verdict, notes.as_str()), (expected, ""), "{low}");
         }
     }
 
@@ -262,7 +269,7 @@ mod tests {
             ),
             (count, "1 here", "send", 800.0, Kept, "come down to 800"),
         ] {
-            let (verdict, notes) = judged(&limits(limit), "counts", built, (figure, value));
+            let (verdict, notes) = judged(&limits(limit), "counts", built, (figure, [value; 3]));
             let case = format!("{limit}, built by {built}: {figure} is {value}: {notes}");
             assert_eq!(verdict, expected, "{case}");
             assert!(
@@ -288,14 +295,16 @@ mod tests {
         };
         let base = |limit: &Limit| limit.measured.or(limit.at_least).unwrap();
         for limit in limits.of(CYCLES) {
-            figures.runs.insert(limit.figure.clone(), vec![base(limit)]);
+            figures
+                .values
+                .insert(limit.figure.clone(), [base(limit); 3]);
         }
         let failing = |figures: &Figures| {
             let (judgements, _) = judge(&limits, figures);
             let failing = judgements.into_iter().filter(|one| one.verdict.fails());
             failing.map(|one| one.figure).collect::<Vec<_>>()
         };
-        assert!(figures.runs.len() >= 11, "{figures:?}");
+        assert!(figures.values.len() >= 11, "{figures:?}");
         assert_eq!(failing(&figures), Vec::<String>::new());
         for limit in limits.of(CYCLES) {
             let worse = match limit.at_least {
@@ -303,20 +312,26 @@ mod tests {
                 None => (base(limit) * 1.06).ceil(),
             };
             let mut changed = figures.clone();
-            changed.runs.insert(limit.figure.clone(), vec![worse]);
+            changed.values.insert(limit.figure.clone(), [worse; 3]);
             assert_eq!(failing(&changed), [limit.figure.as_str()]);
         }
     }
 
     #[test]
     fn what_this_machine_cannot_measure_is_told_and_not_judged() {
-        for (what, expected) in [("ho", Verdict::Missing), ("hop", Verdict::NotJudged)] {
+        for (figure, expected) in [
+            ("path/block", Verdict::Missing),
+            ("path@observed/block", Verdict::NotJudged),
+        ] {
+            let limits = format!(
+                "[[limit]]\nsource = 'latency'\nfigure = 'latency/{figure}/plain: a / b'\n\
+                 at_most = 1.2\nreason = 'because'"
+            );
             let figures = Figures {
-                source: "hop".to_owned(),
-                unmeasured: [(what.to_owned(), "no right".to_owned())].into(),
-                ..Figures::default()
+                no_real_time: Some("no right".to_owned()),
+                ..Figures::from_source(LATENCY)
             };
-            let (judgements, notes) = judge(&limits("measured = 1"), &figures);
+            let (judgements, notes) = judge(&Limits::parse(&limits).unwrap(), &figures);
             assert_eq!(
                 (judgements[0].verdict, notes),
                 (expected, vec!["no right".to_owned()])

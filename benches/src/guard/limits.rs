@@ -4,12 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use clap::ValueEnum;
-use lager_benches::Scenario;
 use serde::Deserialize;
 
 use crate::error::{GuardError, read};
-use crate::figures::RatioName;
+use crate::estimates::parts;
+use crate::figures::LATENCY;
 
 /// The content of the file.
 #[derive(Debug, Deserialize)]
@@ -43,7 +42,7 @@ pub(crate) struct Counted {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Limit {
-    /// `hop`, `path` or `fanout`, or one of [`Limits::counted`].
+    /// [`LATENCY`], or one of [`Limits::counted`].
     pub(crate) source: String,
     /// The figure's name within its source.
     pub(crate) figure: String,
@@ -101,11 +100,6 @@ impl Limits {
 }
 
 impl Limit {
-    /// The parts of the figure's name, if the figure is a ratio.
-    pub(crate) fn ratio(&self) -> Option<RatioName<'_>> {
-        RatioName::parse(&self.figure)
-    }
-
     fn check(&self, counted: &BTreeMap<String, Counted>) -> Result<(), String> {
         if self.reason.trim().is_empty() {
             return Err("has no reason; say why the limit is what it is".to_owned());
@@ -124,19 +118,19 @@ impl Limit {
                 return Err(format!("has {what} = {value}; give a positive number"));
             }
         }
-        let is_timed = Scenario::from_str(&self.source, false).is_ok();
+        let is_timed = self.source == LATENCY;
         if !is_timed && !counted.contains_key(&self.source) {
             return Err(format!(
-                "has a source that is neither hop, path or fanout nor described under [counted.{}]",
+                "has a source that is neither `{LATENCY}` nor described under [counted.{}]",
                 self.source
             ));
         }
         let margin = self.margin_percent.is_some();
         let why = match (is_timed, self.at_most, self.at_least, self.measured) {
-            (true, Some(_), None, None) if !margin => match self.ratio() {
+            (true, Some(_), None, None) if !margin => match parts(&self.figure) {
                 Some(_) => return Ok(()),
                 None => {
-                    "names no ratio; write it as `what mode regime: label / label p50`, for instance `hop block same-core: lager / iceoryx2/event p50`"
+                    "names no ratio; write it as `group: row / row` with criterion's names, for instance `latency/hop/block/same-core: lager / iceoryx2/event`"
                 }
             },
             (true, ..) => {
@@ -158,8 +152,8 @@ mod tests {
 
     const COUNTED: &str = "[counted.instructions]\nrustc = '1.95.0'\ntarget = 't'\n\
                            margin_percent = 5\nmargin_percent_other_rustc = 15\n";
-    const RATIO: &str = "[[limit]]\nsource = 'hop'\n\
-                         figure = 'hop spin plain: lager / iceoryx2/header p50'\n\
+    const RATIO: &str = "[[limit]]\nsource = 'latency'\n\
+                         figure = 'latency/hop/spin/plain: lager / iceoryx2/header'\n\
                          at_most = 1.2\ngoal = 1.05\nreason = 'because'\n";
     const COUNT: &str = "[[limit]]\nsource = 'instructions'\nfigure = 'decode'\n\
                          measured = 480\nreason = 'because'\n";
@@ -168,7 +162,7 @@ mod tests {
     fn the_checked_in_limits_are_sound() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("limits.toml");
         let limits = Limits::load(&file).unwrap_or_else(|error| panic!("{error}"));
-        for source in ["hop", "path", "fanout", "instructions", "cycles"] {
+        for source in [LATENCY, "instructions", "cycles"] {
             assert!(limits.of(source).count() > 0, "nothing guards {source}");
         }
     }
@@ -177,7 +171,7 @@ mod tests {
     fn ratios_and_counts_are_read() {
         let limits = Limits::parse(&format!("{COUNTED}{RATIO}{COUNT}")).unwrap();
         assert_eq!(limits.limits.len(), 2);
-        assert_eq!(limits.of("hop").next().unwrap().at_most, Some(1.2));
+        assert_eq!(limits.of(LATENCY).next().unwrap().at_most, Some(1.2));
         assert_eq!(
             limits.of("instructions").next().unwrap().measured,
             Some(480.0)
@@ -200,12 +194,9 @@ mod tests {
             (RATIO.replace("at_most = 1.2", ""), "is a ratio"),
             (RATIO.replace("goal", "measured"), "is a ratio"),
             (RATIO.replace("goal", "margin_percent"), "is a ratio"),
-            (
-                RATIO.replace("'hop'", "'hopp'"),
-                "neither hop, path or fanout",
-            ),
-            (RATIO.replace("spin", "asleep"), "asleep"),
-            (RATIO.replace(" / ", " "), "label / label"),
+            (RATIO.replace("'latency'", "'hop'"), "neither `latency`"),
+            (RATIO.replace(" / ", " "), "group: row / row"),
+            (RATIO.replace(": ", " "), "group: row / row"),
             (COUNT.to_owned(), "[counted.instructions]"),
             (format!("{COUNTED}{COUNT}at_most = 500\n"), "is a count"),
             (format!("{COUNTED}{COUNT}").replace("15", "3"), "margins"),

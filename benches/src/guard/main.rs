@@ -1,35 +1,32 @@
-//! The guard: a program that measures, and fails if a limit of `benches/limits.toml` is broken.
+//! The guard: a program that fails if a limit of `benches/limits.toml` is broken.
 //!
-//! Run it with `benches/guard`: the script builds it, starts callgrind to count instructions, and
-//! gives the guard the counts. The guard is apart from the library because a scenario measures and
-//! judges nothing, while the guard judges and leaves the measuring to the library.
+//! Run it with `benches/guard`: the script builds it, lets criterion time and callgrind count, and
+//! gives the guard the estimates and the counts. The guard judges, and measures nothing itself.
 //!
 //! Exit codes: 0 all limits are kept, 1 a limit is broken or its figure is missing, 2 the guard
 //! could not do its work.
 
 mod error;
+mod estimates;
 mod figures;
 mod judge;
 mod limits;
-mod measure;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use lager_benches::chip::{self, ChipReport, Programs};
-use lager_benches::{Scenario, at_least_one, median};
 use lager_machine::Machine;
 use serde::Serialize;
 
 use crate::error::{GuardError, read};
-use crate::figures::{AARCH64, Built, CYCLES, Figures, INSTRUCTIONS};
+use crate::figures::{AARCH64, Built, CYCLES, Figures, INSTRUCTIONS, LATENCY};
 use crate::judge::{Judgement, Verdict, judge};
 use crate::limits::Limits;
-use crate::measure::measure;
 
-/// Checks the bus, the path and the boards' images against their limits: ratios measured in one
-/// run, and counts of instructions and cycles.
+/// Checks the bus, the path and the boards' images against their limits: ratios of criterion's
+/// estimates, and counts of instructions and cycles.
 ///
 /// Exit codes: 0 all limits are kept; 1 a limit is broken or its figure is missing; 2 the guard
 /// could not do its work.
@@ -37,28 +34,21 @@ use crate::measure::measure;
 #[command(
     name = "benches/guard",
     bin_name = "benches/guard",
-    after_help = "Examples:\n  benches/guard                        everything, about four minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json\n  benches/guard --only hop,path,fanout --spread 10    before a limit is changed"
+    after_help = "Examples:\n  benches/guard                        everything, about five minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only latency --json\n  benches/guard --only latency --repetitions 20    before a limit is changed"
 )]
 struct Arguments {
     /// The limits
     #[arg(long, value_name = "FILE", default_value = "benches/limits.toml")]
     limits: PathBuf,
-    /// Judge these sources only: hop, path, fanout, instructions, cycles
+    /// Judge these sources only: latency, instructions, cycles
     #[arg(long, value_name = "SOURCE", value_delimiter = ',')]
     only: Vec<String>,
-    /// Runs of each measurement; a ratio is the median over them
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
-    runs: usize,
-    /// How often to measure a scenario while a limit is broken or the machine is held up; all runs
-    /// count together
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
-    attempts: usize,
-    /// Judge nothing: measure each scenario N times, and show how far its figures spread
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
-    spread: Option<usize>,
     /// One line of JSON instead of a table
     #[arg(long)]
     json: bool,
+    /// Criterion's estimates, a folder for each repetition (the script gives this)
+    #[arg(long, value_name = "FOLDER", hide = true)]
+    estimates: Option<PathBuf>,
     /// Instruction counts as gungraun writes them (the script gives this)
     #[arg(long, value_name = "FILE", hide = true)]
     callgrind: Option<PathBuf>,
@@ -77,8 +67,6 @@ struct Findings {
 }
 
 fn main() -> ExitCode {
-    lager_benches::run_if_asked();
-    lager_benches::slow::refuse_in_vain();
     match Guard::new(Arguments::parse()).and_then(|guard| guard.run()) {
         Ok(kept) => ExitCode::from(u8::from(!kept)),
         Err(error) => {
@@ -125,9 +113,6 @@ impl Guard {
 
     /// Measures and judges; returns whether every limit is kept.
     fn run(&self) -> Result<bool, GuardError> {
-        if let Some(times) = self.arguments.spread {
-            return self.spread(times).map(|()| true);
-        }
         let findings = self.judge()?;
         match self.arguments.json {
             true => println!("{}", json(&findings)),
@@ -145,28 +130,7 @@ impl Guard {
             notes: Vec::new(),
         };
         for source in &self.sources {
-            let counts = match source.as_str() {
-                AARCH64 => &self.arguments.aarch64,
-                _ => &self.arguments.callgrind,
-            };
-            let figures = match (Scenario::from_str(source, false), counts) {
-                (Ok(scenario), _) => {
-                    let (runs, attempts) = (self.arguments.runs, self.arguments.attempts);
-                    let (figures, notes) = measure(limits, scenario, runs, attempts)?;
-                    findings.notes.extend(notes);
-                    figures
-                }
-                (Err(_), _) if source == CYCLES => Figures::of_chips(chips()?, |name| {
-                    limits.of(CYCLES).any(|limit| limit.figure == name)
-                })?,
-                (Err(_), Some(file)) if source == INSTRUCTIONS => {
-                    Figures::of_callgrind(file, &read(file)?, Built::by_rustc()?)?
-                }
-                (Err(_), Some(file)) if source == AARCH64 => {
-                    Figures::of_qemu(file, &read(file)?, Built::by_rustc()?)?
-                }
-                (Err(_), _) => return Err(GuardError::NoCounts(source.clone())),
-            };
+            let figures = self.figures(source)?;
             let (judgements, notes) = judge(limits, &figures);
             findings.kept &= !judgements.iter().any(|one| one.verdict.fails());
             findings.limits.extend(judgements);
@@ -175,28 +139,22 @@ impl Guard {
         Ok(findings)
     }
 
-    /// Shows how far the limited ratios spread from one measurement to the next.
-    fn spread(&self, times: usize) -> Result<(), GuardError> {
-        head(["lowest", "median", "highest", "limit", "goal"], "");
-        for scenario in self.scenarios() {
-            let once = |_| measure::once(&self.limits, scenario, self.arguments.runs);
-            let measured = (0..times).map(once).collect::<Result<Vec<_>, _>>()?;
-            for limit in self.limits.of(&scenario.to_string()) {
-                let values = measured.iter().filter_map(|one| one.get(&limit.figure));
-                let mut values: Vec<f64> = values.collect();
-                values.sort_unstable_by(f64::total_cmp);
-                let (lowest, highest) = (values.first().copied(), values.last().copied());
-                let cells = [lowest, median(values), highest, limit.at_most, limit.goal];
-                line(&limit.figure, cells.map(number), "");
+    fn figures(&self, source: &str) -> Result<Figures, GuardError> {
+        let measured = match source {
+            LATENCY => &self.arguments.estimates,
+            AARCH64 => &self.arguments.aarch64,
+            _ => &self.arguments.callgrind,
+        };
+        let names = || self.limits.of(source).map(|limit| limit.figure.as_str());
+        match (source, measured) {
+            (CYCLES, _) => Figures::of_chips(chips()?, |name| names().any(|one| one == name)),
+            (LATENCY, Some(folder)) => estimates::ratios(folder, names()),
+            (INSTRUCTIONS, Some(file)) => {
+                Figures::of_callgrind(file, &read(file)?, Built::by_rustc()?)
             }
+            (AARCH64, Some(file)) => Figures::of_qemu(file, &read(file)?, Built::by_rustc()?),
+            _ => Err(GuardError::NotMeasured(source.to_owned())),
         }
-        Ok(())
-    }
-
-    /// The sources that are timed.
-    fn scenarios(&self) -> impl Iterator<Item = Scenario> {
-        let scenario = |source: &String| Scenario::from_str(source, false).ok();
-        self.sources.iter().filter_map(scenario)
     }
 }
 
@@ -207,12 +165,21 @@ fn chips() -> Result<ChipReport, GuardError> {
 }
 
 fn print(findings: &Findings) {
-    head(["measured", "limit", "goal"], "verdict");
+    println!("{}\n", findings.machine);
+    let line = |figure: &str, [measured, interval, limit, goal, verdict]: [&str; 5]| {
+        println!("{figure:<68} {measured:>9} {interval:>15} {limit:>9} {goal:>9}  {verdict}");
+    };
+    line("figure", ["measured", "95 %", "limit", "goal", "verdict"]);
     for one in &findings.limits {
         let mark = if one.at_least { ">= " } else { "" };
         let limit = format!("{mark}{}", number(Some(one.limit)));
-        let cells = [number(one.measured), limit, number(one.goal)];
-        line(&one.figure, cells, &one.verdict.to_string());
+        let interval = one
+            .interval
+            .map(|ends| ends.map(|end| number(Some(end))).join(" to "));
+        let verdict = one.verdict.to_string();
+        let (measured, goal) = (number(one.measured), number(one.goal));
+        let interval = interval.unwrap_or_default();
+        line(&one.figure, [&measured, &interval, &limit, &goal, &verdict]);
         if one.verdict.fails() {
             println!("      {}", one.reason);
         }
@@ -229,22 +196,11 @@ fn print(findings: &Findings) {
     println!("\n{kept} of {judged} limits kept");
 }
 
-/// Prints the machine, and the head of a table of figures.
-fn head<const N: usize>(columns: [&str; N], last: &str) {
-    println!("{}\n", Machine::here());
-    line("figure", columns.map(str::to_owned), last);
-}
-
-/// Prints a line of a table of figures.
-fn line<const N: usize>(figure: &str, cells: [String; N], last: &str) {
-    let cells = cells.map(|cell| format!(" {cell:>9}")).concat();
-    println!("{figure:<70}{cells}  {last}");
-}
-
-/// A ratio with two digits, or a count as a whole number.
+/// A ratio, or a count as a whole number.
 fn number(value: Option<f64>) -> String {
     match value {
         Some(value) if value.fract() == 0.0 && value >= 100.0 => format!("{value}"),
+        Some(value) if value < 0.1 => format!("{value:.3}"),
         Some(value) => format!("{value:.2}"),
         None => "-".to_owned(),
     }

@@ -300,7 +300,7 @@ where
     let send = move |sample: &Sample| {
         let mut loan = publisher.loan().map_err(broken)?;
         *loan = *sample;
-        slow::publish(0);
+        slow::publish();
         loan.send().map_err(broken)
     };
     let receive = move || {

@@ -194,7 +194,7 @@ where
         // Blank memory would be written twice.
         let mut loan = publisher.loan_uninit().map_err(broken)?;
         loan.words.copy_from_slice(&block.words);
-        slow::publish(0);
+        slow::publish();
         loan.send().map_err(broken)
     };
     let receive = move || {

@@ -24,21 +24,26 @@ use lager_home::Clock;
 use lager_ports::Bus;
 use lager_rig::schedule::{Placement, RealTime};
 use lager_rig::{Board, Domain, Outset, Process, SPEAK_EVERY_NS, interrupted, wheels_in_the_air};
-use lager_topics::Role;
+use lager_sample::Topic as _;
+use lager_topics::{Role, SensorLine};
 use lager_wire::{Callsign, Centimetres, Command, LineState, Payload, WheelCommand};
 
-use super::Beside;
 use super::processes::{ANSWER_WITHIN, Processes};
 use super::services::{BRIDGE, LOGIC, Setup, processes_of};
 use super::turn::{Chain, next_due, sleep_until};
+use super::{ALONE_IN_REAL_TIME as ALONE, Beside};
 use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
+use crate::slow;
 
 /// The longest time until the robot drives, at the start and after each pause.
 const UP_WITHIN: Duration = Duration::from_secs(10);
 
 /// The number of frames in a row with an answer, after which a robot counts as awake.
 const IN_A_ROW: usize = 5;
+
+/// How often a sample is published or received on the way of a frame: the line, the order, the command.
+const STEPS: usize = 6;
 
 const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
 
@@ -217,6 +222,9 @@ impl Robot {
             return Ok(Reaction::None);
         };
         let start = Clock::monotonic_ns();
+        if self.name != ALONE {
+            slow::work(STEPS * SensorLine::QOS.observers);
+        }
         self.sensor.cable.write(&packet)?;
         let give_up = start + limit.as_nanos() as u64;
         let mut buffer = [0; 256];

@@ -83,7 +83,7 @@ fn lager<const WORDS: usize>(side: &Side, round: &Round, readers: usize) -> Time
         let publish = |block: &Block<WORDS>| {
             let mut loan = publisher.loan_uninit().map_err(broken)?;
             loan.words.copy_from_slice(&block.words);
-            slow::publish(readers);
+            slow::publish();
             loan.send().map_err(broken)
         };
         timed(side, round, publish, |block| tell(side, block))
@@ -149,7 +149,7 @@ fn ring(side: &Side, round: &Round) -> Times {
             let mut loan = publisher.loan().map_err(broken)?;
             *loan = *sample;
             if rings(sample.number()) {
-                slow::publish(SensorLine::QOS.observers);
+                slow::publish();
             }
             loan.send().map_err(broken)
         };
