@@ -286,8 +286,9 @@ void ping(const Setup& setup, const Words& words) {
   std::vector<uint64_t> times;
   times.reserve(numbers.count);
   const auto rival = join(setup);
-  const auto back = rival->receiver("back");
+  // In this order, so that the two processes do not wait for each other.
   const auto there = rival->sender("there");
+  const auto back = rival->receiver("back");
   uint64_t number = HELLO;
   const Write write = [&](void* place) {
     image.draw(place);
