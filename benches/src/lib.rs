@@ -24,6 +24,8 @@ mod path;
 mod plan;
 mod publish;
 pub mod report;
+#[cfg(feature = "rivals")]
+pub mod rivals;
 pub mod rounds;
 mod sample;
 pub mod saved;

@@ -8,6 +8,7 @@
 //! that the sender notifies after publishing.
 
 use core::fmt::Debug;
+use core::mem::MaybeUninit;
 use core::time::Duration;
 use std::error::Error;
 use std::time::Instant;
@@ -213,12 +214,22 @@ pub(crate) struct Sender<P: Debug + ZeroCopySend + 'static, H: Header> {
 }
 
 impl<P: Copy + Debug + ZeroCopySend + 'static, H: Header> Sender<P, H> {
-    #[allow(unsafe_code)]
     pub(crate) fn send(&mut self, payload: &P) -> Result<(), Fault> {
+        self.send_written(|place| {
+            place.write(*payload);
+        })
+    }
+
+    /// Sends a sample of which `write` writes every byte.
+    #[allow(unsafe_code)]
+    pub(crate) fn send_written(
+        &mut self,
+        write: impl FnOnce(&mut MaybeUninit<P>),
+    ) -> Result<(), Fault> {
         let mut loan = self.publisher.loan_uninit().map_err(broken)?;
         self.header = self.header.next();
         *loan.user_header_mut() = self.header;
-        loan.payload_mut().write(*payload);
+        write(loan.payload_mut());
         // SAFETY: the payload was written just now.
         let loan = unsafe { loan.assume_init() };
         loan.send().map_err(broken)?;
