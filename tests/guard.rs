@@ -58,7 +58,7 @@ fn guard_beside(arguments: &[&str], work: impl FnOnce(u32)) -> Said {
 
 /// Runs the guard with a slow-down and returns its output.
 fn slowed(slow: &str, only: &str) -> Said {
-    guard(&["--slow", slow, "--only", only, "--repetitions", "1"])
+    guard(&["--slow", slow, "--only", only, "--repetitions", "3"])
 }
 
 /// Asserts that the guard failed and named all of `figures`.

@@ -42,8 +42,9 @@ const UP_WITHIN: Duration = Duration::from_secs(10);
 /// The number of frames in a row with an answer, after which a robot counts as awake.
 const IN_A_ROW: usize = 5;
 
-/// How often a sample is published or received on the way of a frame: the line, the order, the command.
-const STEPS: usize = 6;
+/// The steps of a frame's way beside which the slow-down is put, with a call for each observer. So
+/// many that the time of a frame is a multiple, also on a machine whose times double now and then.
+const STEPS: usize = 40;
 
 const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
 
