@@ -30,11 +30,10 @@ pub unsafe extern "C" fn rivals_join(
     depth: usize,
     readers: usize,
 ) -> *mut Box<dyn Member> {
-    // SAFETY: the caller gives strings.
     let text = |text| {
-        unsafe { CStr::from_ptr(text) }
-            .to_string_lossy()
-            .into_owned()
+        // SAFETY: the caller gives strings.
+        let text = unsafe { CStr::from_ptr(text) };
+        text.to_string_lossy().into_owned()
     };
     let setup = Setup {
         kind: text(kind),
