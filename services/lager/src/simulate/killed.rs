@@ -135,7 +135,7 @@ impl Killed {
     /// A simulator that goes on in the world of the dead one.
     fn new_body(&mut self) {
         let kept = self.whole.robot.truth().world;
-        let mut body = Robot::new(&self.warehouse, self.options.clone()).expect("a valid world");
+        let mut body = Robot::new(&self.warehouse, self.options).expect("a valid world");
         body.resume(&kept);
         self.whole.robot = body;
     }
