@@ -38,6 +38,16 @@ pub enum Way {
     Back,
 }
 
+impl Way {
+    /// The name of its topic, for a middleware that gives none itself.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::There => "there",
+            Self::Back => "back",
+        }
+    }
+}
+
 /// Writes all bytes of a sample into the place that it is given.
 pub type Write<'a> = &'a mut dyn FnMut(*mut u8);
 

@@ -35,7 +35,7 @@ pub(crate) fn meet(
     is_first: bool,
     [out, back]: [&'static str; 2],
 ) -> Result<impl End + use<>, BenchError> {
-    let session = zenoh::open(config(socket, is_first)?)
+    let session = zenoh::open(config(socket, is_first, false)?)
         .wait()
         .map_err(failed)?;
     let subscriber = session.declare_subscriber(back).wait().map_err(failed)?;
@@ -71,7 +71,9 @@ pub(crate) fn meet(
     Ok((send, receive))
 }
 
-fn config(socket: &Path, is_first: bool) -> Result<Config, BenchError> {
+/// The configuration of a peer on `socket`, which the first one makes. `shares`: it uses Zenoh's shared
+/// memory.
+pub(crate) fn config(socket: &Path, is_first: bool, shares: bool) -> Result<Config, BenchError> {
     let endpoint = format!("unixsock-stream/{}", socket.display());
     let (listen, connect) = match is_first {
         true => (vec![endpoint], vec![]),
@@ -91,6 +93,7 @@ fn config(socket: &Path, is_first: bool) -> Result<Config, BenchError> {
             "multicast": { "enabled": false },
             "gossip": { "enabled": false },
         },
+        "transport": { "shared_memory": { "enabled": shares } },
         "adminspace": { "enabled": false },
     });
     Config::from_json5(&config.to_string()).map_err(failed)

@@ -41,25 +41,18 @@ pub(super) fn join(setup: &Setup) -> Result<Box<dyn super::Member>, BenchError> 
     }))
 }
 
-const fn name(way: Way) -> &'static str {
-    match way {
-        Way::There => "there",
-        Way::Back => "back",
-    }
-}
-
 impl Bare {
     fn sends<const WORDS: usize>(&self, way: Way) -> Result<Box<dyn super::Sender>, BenchError> {
         Ok(Box::new(Sends::<WORDS> {
-            port: self.member.sender(name(way))?,
-            bell: self.member.notifier(name(way), self.setup.readers)?,
+            port: self.member.sender(way.name())?,
+            bell: self.member.notifier(way.name(), self.setup.readers)?,
         }))
     }
 
     fn receives<const WORDS: usize>(&self, way: Way) -> Result<Box<dyn Receiver>, BenchError> {
         Ok(Box::new(Receives::<WORDS> {
-            port: self.member.subscriber(name(way))?,
-            bell: self.member.listener(name(way), self.setup.readers)?,
+            port: self.member.subscriber(way.name())?,
+            bell: self.member.listener(way.name(), self.setup.readers)?,
         }))
     }
 }

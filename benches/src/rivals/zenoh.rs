@@ -5,16 +5,16 @@
 use core::fmt::Display;
 use std::time::Duration;
 
-use serde_json::json;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::Sample;
 use zenoh::shm::{
     BlockOn, GarbageCollect, PosixShmProviderBackend, ShmProvider, ShmProviderBuilder,
 };
-use zenoh::{Config, Session, Wait};
+use zenoh::{Session, Wait};
 
 use super::{Heard, Member, Receiver, Sender, Setup, Way, Write};
+use crate::baseline::zenoh::config;
 use crate::error::{BenchError, Fault, broken};
 
 struct Zenoh {
@@ -27,37 +27,11 @@ pub(super) fn join(setup: &Setup, shares: bool) -> Result<Box<dyn Member>, Bench
     Ok(Box::new(Zenoh { setup, shares }))
 }
 
-const fn name(way: Way) -> &'static str {
-    match way {
-        Way::There => "there",
-        Way::Back => "back",
-    }
-}
-
 impl Zenoh {
     /// The session of one way: its sender has the socket, and each receiver connects to it.
     fn open(&self, way: Way, sends: bool) -> Result<Session, BenchError> {
-        let socket = self.setup.folder.join(name(way));
-        let endpoint = format!("unixsock-stream/{}", socket.display());
-        let (listen, connect) = match sends {
-            true => (vec![endpoint], vec![]),
-            false => (vec![], vec![endpoint]),
-        };
-        let config = json!({
-            "mode": "peer",
-            "listen": { "endpoints": listen, "exit_on_failure": true },
-            "connect": {
-                "endpoints": connect,
-                "timeout_ms": 10_000,
-                "exit_on_failure": true,
-                // The socket may appear a moment later.
-                "retry": { "period_init_ms": 2, "period_max_ms": 20, "period_increase_factor": 2 },
-            },
-            "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
-            "transport": { "shared_memory": { "enabled": self.shares } },
-            "adminspace": { "enabled": false },
-        });
-        let config = Config::from_json5(&config.to_string()).map_err(failed)?;
+        let socket = self.setup.folder.join(way.name());
+        let config = config(&socket, sends, self.shares)?;
         zenoh::open(config).wait().map_err(failed)
     }
 }
@@ -66,7 +40,7 @@ impl Member for Zenoh {
     fn sender(&self, way: Way) -> Result<Box<dyn Sender>, BenchError> {
         let session = self.open(way, true)?;
         let port = session
-            .declare_publisher(name(way))
+            .declare_publisher(way.name())
             // Loses rather than waits, as all do, and batches nothing.
             .congestion_control(CongestionControl::Drop)
             .express(true)
@@ -131,7 +105,7 @@ struct Receives {
 impl Receiver for Receives {
     fn run(&self, heard: Heard, is_over: &dyn Fn() -> bool) -> Result<(), Fault> {
         let take = move |sample: Sample| heard.call(&sample.payload().to_bytes());
-        let subscriber = self.session.declare_subscriber(name(self.way));
+        let subscriber = self.session.declare_subscriber(self.way.name());
         let subscriber = subscriber.callback(take).wait().map_err(broken)?;
         while !is_over() {
             std::thread::sleep(Duration::from_millis(20));

@@ -162,6 +162,7 @@ impl Behaviour for Search {
 
     fn restore(&mut self, status: &NavigatorStatus, ordered: Command) {
         self.turns = status.tries;
+        // If it has seen no tape yet, there was none in the angle either.
         self.from_tape = self.turns > 0;
         self.after_half = status.doubt & AFTER_HALF != 0;
         self.passed = status.doubt & PASSED != 0;

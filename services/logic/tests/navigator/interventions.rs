@@ -174,7 +174,7 @@ fn refused_turns_and_drops_are_tried_again() {
 fn a_board_that_refuses_for_ever_is_reported() {
     let mut trial = mission();
     trial.body.refuse = u32::MAX;
-    assert!(trial.run_until(SECOND * 100, |trial| trial.phase() == Phase::Stuck));
+    assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Stuck));
     assert!(
         said(&trial, "does not do what it is asked"),
         "{}",
