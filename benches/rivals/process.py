@@ -75,7 +75,8 @@ class Process:
     def why(self, what: str) -> str:
         self.errors.seek(0)
         lines = self.errors.read().decode(errors="replace").strip().splitlines()
-        return f"{what}: {lines[-1][:200]}" if lines else what
+        # The last line of the bus, iceoryx2 and Zenoh refers to the one before.
+        return f"{what}: {' | '.join(lines[-2:])[:400]}" if lines else what
 
     def end(self) -> None:
         if self.process.stdin and not self.process.stdin.closed:

@@ -3,7 +3,7 @@
 
 use core::time::Duration;
 
-use iceoryx2::port::listener::Listener;
+use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
@@ -95,7 +95,11 @@ struct Receives<const WORDS: usize> {
 impl<const WORDS: usize> Receiver for Receives<WORDS> {
     fn run(&self, heard: Heard, is_over: &dyn Fn() -> bool) -> Result<(), Fault> {
         while !is_over() {
-            self.bell.timed_wait(|_| (), LOOK).map_err(broken)?;
+            match self.bell.timed_wait(|_| (), LOOK) {
+                // A process that was frozen goes on.
+                Ok(_) | Err(ListenerWaitError::InterruptSignal) => {}
+                Err(error) => return Err(broken(error)),
+            }
             while let Some(sample) = self.port.receive().map_err(broken)? {
                 heard.call(lager_sample::bytes_of(sample.payload()));
             }
