@@ -340,6 +340,9 @@ impl Visit {
         self.keep_wheels();
         self.tell_events();
         let handle = self.page.shared.handle.clone();
+        if handle.is_behind() {
+            return std::mem::take(&mut self.lines);
+        }
         let revision = handle.revision();
         if self.revision != Some(revision) || self.looked.elapsed() >= ABOUT {
             self.revision = Some(revision);

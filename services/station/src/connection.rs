@@ -75,6 +75,8 @@ pub(crate) struct Connection {
     begun_since: Option<Instant>,
     /// How long the next bytes may have waited because this process was held up.
     late: Duration,
+    /// How many bytes waited after that and have not been read yet.
+    behind: usize,
 }
 
 impl Connection {
@@ -89,19 +91,18 @@ impl Connection {
             unread_since: now,
             begun_since: None,
             late: Duration::ZERO,
+            behind: 0,
         }
     }
 
-    /// Tells how long this process was held up; bytes that wait now may have come meanwhile.
+    /// Tells how long this process was held up; bytes that wait now may have come meanwhile. The
+    /// next call of [`Connection::read`] reads them all.
     pub(crate) fn held_up(&mut self, pause: Duration) {
-        if self.waits() {
+        let waits = ioctl_fionread(&self.stream).unwrap_or(0);
+        if waits > 0 {
             self.late = self.late.max(pause);
+            self.behind = usize::try_from(waits).unwrap_or(usize::MAX);
         }
-    }
-
-    /// Whether bytes wait to be read here.
-    fn waits(&self) -> bool {
-        ioctl_fionread(&self.stream).is_ok_and(|waits| waits > 0)
     }
 
     /// How long the bytes that are read next may have waited, at most.
@@ -119,7 +120,8 @@ impl Connection {
         !self.unread.is_empty()
     }
 
-    /// Reads the bytes that have arrived and hands on each line.
+    /// Reads the bytes that have arrived and hands on each line: at most [`READ`] bytes, or all that
+    /// waited when this process had been held up.
     ///
     /// # Errors
     ///
@@ -129,13 +131,29 @@ impl Connection {
         now: Instant,
         mut hear: impl FnMut(Result<&str, LineError>),
     ) -> io::Result<()> {
+        loop {
+            let count = self.read_once(now, &mut hear)?;
+            self.behind = self.behind.saturating_sub(count);
+            if count < READ || self.behind == 0 {
+                self.behind = 0;
+                return Ok(());
+            }
+        }
+    }
+
+    /// Returns how many bytes it has read.
+    fn read_once(
+        &mut self,
+        now: Instant,
+        hear: &mut impl FnMut(Result<&str, LineError>),
+    ) -> io::Result<usize> {
         let mut buffer = [0; READ];
         let count = match self.stream.read(&mut buffer) {
             Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(count) => count,
             Err(error) if is_nothing(&error) => {
                 self.late = Duration::ZERO;
-                return Ok(());
+                return Ok(0);
             }
             Err(error) => return Err(error),
         };
@@ -154,7 +172,7 @@ impl Connection {
             _ if ended || self.begun_since.is_none() => self.begun_since = Some(now),
             _ => {}
         }
-        Ok(())
+        Ok(count)
     }
 
     /// Writes a line, as much as the peer takes at once; the rest waits.
@@ -267,6 +285,31 @@ mod tests {
             end.expect_err("it has gone").kind(),
             io::ErrorKind::UnexpectedEof
         );
+    }
+
+    #[test]
+    fn what_waited_while_this_process_was_held_up_is_read_at_once_and_no_more() {
+        let (ours, mut theirs) = UnixStream::pair().expect("sockets");
+        ours.set_nonblocking(true).expect("a socket");
+        let now = Instant::now();
+        let mut connection = Connection::new(Stream::Unix(ours), now);
+        let line = b"styrcomm\n";
+        let lines = |connection: &mut Connection| {
+            let mut count = 0;
+            connection.read(now, |_| count += 1).expect("it is there");
+            count
+        };
+        let many = line.repeat(2_000);
+        theirs.write_all(&many).expect("there is room");
+        assert_eq!(lines(&mut connection), READ / line.len(), "one turn");
+        connection.held_up(SLOWEST);
+        theirs.write_all(&many).expect("there is room");
+        // A peer that goes on sending does not keep this thread from the others.
+        let read = lines(&mut connection);
+        let waited = 2_000 - READ / line.len();
+        let one_turn = READ.div_ceil(line.len());
+        assert!((waited..=waited + one_turn).contains(&read), "{read}");
+        assert_eq!(lines(&mut connection), READ / line.len(), "as before");
     }
 
     #[test]

@@ -28,6 +28,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
+use lager_orders::lease::LATEST_MOVE;
 use lager_orders::{Action, Reason, Wheels};
 use lager_plant::Warehouse;
 use lager_wire::OperatorArm;
@@ -67,6 +68,8 @@ struct State {
     station: Station,
     /// Grows with every change.
     revision: u64,
+    /// What peers had sent by then, the thread of the sockets has read. `None` before it runs.
+    caught_up: Option<Duration>,
     outlets: Outlets,
 }
 
@@ -287,6 +290,7 @@ impl Handle {
                 state: Mutex::new(State {
                     station,
                     revision: 0,
+                    caught_up: None,
                     outlets: Outlets::default(),
                 }),
                 changed: Condvar::new(),
@@ -332,6 +336,13 @@ impl Handle {
         self.lock().revision
     }
 
+    /// Whether the thread of the sockets was held up and has not read yet what peers sent meanwhile.
+    /// Until it has, what the station knows of a robot is not what the robot said last.
+    pub fn is_behind(&self) -> bool {
+        let caught_up = self.lock().caught_up;
+        caught_up.is_some_and(|at| self.now().saturating_sub(at) > LATEST_MOVE)
+    }
+
     /// Waits until the number of the last change differs from `seen`, at most `timeout`, and
     /// returns it.
     pub fn wait(&self, seen: u64, timeout: Duration) -> u64 {
@@ -357,6 +368,11 @@ impl Handle {
     pub(crate) fn turn(&self) {
         let mut state = self.lock();
         state.turn(self.now());
+    }
+
+    /// What peers had sent by then has been read.
+    pub(crate) fn caught_up(&self, by: Duration) {
+        self.lock().caught_up = Some(by);
     }
 
     /// Changes the station and tells the threads that wait.

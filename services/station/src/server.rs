@@ -200,6 +200,7 @@ impl Server {
         let mut turned = Instant::now();
         while !shutdown.load(Ordering::SeqCst) {
             let lets_in = self.rests.is_none_or(|until| Instant::now() >= until);
+            let began = self.handle.now();
             let ready = self.wait(lets_in)?;
             let now = Instant::now();
             (self.turned.0)();
@@ -220,6 +221,7 @@ impl Server {
             for peer in ready.read {
                 self.hear(now, peer);
             }
+            self.handle.caught_up(began);
             self.say(now);
             if lets_in {
                 self.let_in(now);
@@ -375,9 +377,12 @@ impl Server {
             Peer::Gag => None,
         };
         let (handle, secrets) = (&self.handle, &self.secrets);
-        let heard = connection.read(now, |line| match &mut gate {
-            Some(gate) => hear_robot(handle, secrets, gate, peer, line),
-            None => handle.change(|station| station.heard_late(peer, late, line)),
+        // In one step, so that nobody sees a state after which a newer one has been read.
+        let heard = handle.change(|station| {
+            connection.read(now, |line| match &mut gate {
+                Some(gate) => hear_robot(station, secrets, gate, peer, line),
+                None => station.heard_late(peer, late, line),
+            })
         });
         if let Err(error) = heard {
             self.end(peer, &error.to_string());
@@ -474,7 +479,7 @@ struct Ready {
 
 /// Passes a robot's line to the station, if its gate lets the line through.
 fn hear_robot(
-    handle: &Handle,
+    station: &mut Station,
     secrets: &Secrets,
     gate: &mut Gate,
     peer: Peer,
@@ -484,7 +489,7 @@ fn hear_robot(
         Ok(line) => gate.judge(secrets, line, Nonce::random),
         Err(_) => Verdict::Pass,
     };
-    handle.change(|station| match (verdict, peer) {
+    match (verdict, peer) {
         (Verdict::Pass, _) => station.heard(peer, line),
         (Verdict::Ask(proof), _) => station.prove(peer, &proof),
         (Verdict::Proved(proof, hello), Peer::Robot(link)) => {
@@ -499,7 +504,7 @@ fn hear_robot(
             station.refuse(peer, &why);
         }
         (Verdict::Proved(..), Peer::Gag) => {}
-    });
+    }
 }
 
 /// Whether this process or the machine can open no more files.

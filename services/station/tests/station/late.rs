@@ -1,6 +1,10 @@
 //! What comes late moves no robot, what was meant for another one neither, and a GaG that does not
 //! read drives nobody on.
 
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex};
+use std::thread::{sleep, yield_now};
 use std::time::Duration;
 
 use lager_lines::Name;
@@ -233,4 +237,43 @@ fn a_gag_that_answers_at_once_is_soon_heard_for_the_next_robot() {
     assert_eq!(second.hears().as_deref(), Some("styrcomm 00000010"));
     drop((second, station));
     answers.join().expect("it ends with the station");
+}
+
+#[test]
+fn a_station_that_was_held_up_shows_no_state_after_which_the_robot_has_told_another_one() {
+    let lock = Arc::new(Mutex::new(()));
+    let station = Running::held_up_by(&lock, |_| {});
+    let handle = &station.handle;
+    let x_mm = || {
+        let robots = handle.robots();
+        robots.first()?.shown.state.as_ref()?.value.x_mm
+    };
+    let mut robot = station.robot();
+    robot.asks("lager 1 north");
+    for round in 0..5 {
+        robot.says(b"state x_mm=0\n");
+        while x_mm() != Some(0) || handle.is_behind() {
+            yield_now();
+        }
+        let held_up = lock.lock().expect("a lock");
+        while !handle.is_behind() {
+            yield_now();
+        }
+        let mut states = String::new();
+        for x_mm in 1..=1_000 {
+            let _ = writeln!(states, "state x_mm={x_mm}");
+        }
+        robot.says(states.as_bytes());
+        // Until they are there, on whichever way.
+        sleep(at(200));
+        drop(held_up);
+        let mut seen = BTreeSet::new();
+        while handle.is_behind() {
+            seen.extend(x_mm());
+        }
+        assert_eq!(x_mm(), Some(1_000), "round {round}: it has caught up");
+        seen.remove(&0);
+        seen.remove(&1_000);
+        assert!(seen.is_empty(), "round {round}: {seen:?}");
+    }
 }

@@ -37,6 +37,14 @@ impl Running {
 
     /// One of which something is otherwise.
     pub(crate) fn with(change: impl FnOnce(&mut ServerConfig)) -> Self {
+        Self::held_up_by(&Arc::default(), change)
+    }
+
+    /// One whose thread goes on only while nobody else has the lock.
+    pub(crate) fn held_up_by(
+        lock: &Arc<Mutex<()>>,
+        change: impl FnOnce(&mut ServerConfig),
+    ) -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::SeqCst);
         let name = format!("lager-sockets-{}-{count}", std::process::id());
@@ -45,7 +53,9 @@ impl Running {
         fs::write(folder.join("warehouse.toml"), WAREHOUSE).expect("a file");
         let mut config = config(&folder);
         change(&mut config);
-        let server = Server::open(config).expect("a station");
+        let mut server = Server::open(config).expect("a station");
+        let lock = Arc::clone(lock);
+        server.each_turn(move || drop(lock.lock()));
         let shutdown = Arc::new(AtomicBool::new(false));
         let ends = Arc::clone(&shutdown);
         Self {
