@@ -4,7 +4,7 @@ use core::fmt;
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_wake::{BoardFault, Wake, Watch};
+use lager_wake::{BoardFault, Pace, Wake, Watch};
 
 use crate::bus::Bus;
 use crate::untyped::Peek;
@@ -13,6 +13,9 @@ use crate::untyped::Peek;
 /// iceoryx2 does not ring, nor does a writer that gives a late reader the last sample of a state.
 const SHORTEST: Duration = Duration::from_millis(5);
 const LONGEST: Duration = Duration::from_millis(100);
+/// How long [`Watcher::pause`] goes on after a ring. The actors that the same sample woke need the
+/// cores now, and samples that follow each other closely are taken together.
+const GATHER: Duration = Duration::from_micros(500);
 
 /// Wakes a thread of an observer when one of its topics has a sample; stays in the thread that made
 /// it.
@@ -91,6 +94,18 @@ impl Watcher {
             } else {
                 self.patience = (2 * self.patience).min(LONGEST);
             }
+        }
+    }
+
+    /// The wait between two looks of a thread that reads many topics: until a sample has come, and
+    /// for half a millisecond more; at most as long as `pace` allows. Without a watcher the thread
+    /// looks again when `pace` says so.
+    pub fn pause(watcher: Option<&mut Self>, pace: &mut Pace) {
+        let most = pace.wait();
+        match watcher.map(|watcher| watcher.wait(most)) {
+            Some(Wake::TimedOut) => {}
+            Some(_) => std::thread::sleep(GATHER),
+            None => std::thread::sleep(most),
         }
     }
 

@@ -1,11 +1,13 @@
-//! The thread that polls the bus, or what a robot's gateway elsewhere has sent.
+//! The thread that reads the bus, or what a robot's gateway elsewhere has sent. A sample of the bus
+//! wakes it if somebody gets each sample; for figures alone it looks now and then.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    IntrospectError, Layout, Look, Place, PlaceError, Raw, ReceiveError, Source, TopicInfo, Watched,
+    IntrospectError, Layout, Look, Place, PlaceError, Raw, ReceiveError, Source, TopicInfo,
+    Watched, Watcher,
 };
 use lager_remote::Kind;
 use lager_sample::{Description, Stamp, Topic};
@@ -67,14 +69,15 @@ pub(crate) fn listen<P: Place>(
     is_over: impl Fn() -> bool,
 ) -> Result<(), GatewayError> {
     let Shown { viewer, outlet } = shown;
-    let mut pace = match viewer.is_some() || outlet.is_some() {
-        true => Pace::keeping(),
+    let (mut pace, watcher) = match viewer.is_some() || outlet.is_some() {
+        true => (Pace::keeping(), watcher(place, watchdog)),
         // Its own figures are made from stamps.
-        false => Pace::counting(),
+        false => (Pace::counting(), None),
     };
     let mut listener = Listener {
         place,
         watchdog,
+        watcher,
         viewer,
         outlet,
         feeds: Vec::new(),
@@ -108,15 +111,25 @@ pub(crate) fn listen<P: Place>(
             let robot = place.unit_time();
             outlet.tick(robot.map_or(Duration::ZERO, |(_, robot)| robot));
         }
-        std::thread::sleep(pace.wait());
+        Watcher::pause(listener.watcher.as_mut(), &mut pace);
     }
     Ok(())
+}
+
+/// A watcher of this thread. Without one the thread looks now and then.
+fn watcher<P: Place>(place: &P, watchdog: &Watchdog) -> Option<Watcher> {
+    let made = watchdog.over("asking to be woken", || place.watcher());
+    made.unwrap_or_else(|error| {
+        tracing::warn!("samples do not wake this gateway, so they go out some ms later: {error}");
+        None
+    })
 }
 
 /// Everything that is listened to.
 struct Listener<'a, P: Place> {
     place: &'a P,
     watchdog: &'a Watchdog,
+    watcher: Option<Watcher>,
     viewer: Option<Box<dyn Viewer>>,
     outlet: Option<Box<dyn Outlet>>,
     feeds: Vec<Box<dyn Feed>>,
@@ -130,6 +143,9 @@ struct Listener<'a, P: Place> {
 trait Feed {
     /// The layout of its samples, and what it carries.
     fn about(&self) -> (Description, Kind);
+
+    /// Lets its samples wake the thread of `watcher`.
+    fn wakes(&self, watcher: &mut Watcher);
 
     /// Takes the new samples. Returns how full the topic's queue was.
     fn drain(&mut self, to: &mut Takers<'_, '_>, pace: &mut Pace) -> Result<(), ReceiveError>;
@@ -229,6 +245,9 @@ impl<P: Place> Listener<'_, P> {
                 if let Some(outlet) = &mut self.outlet {
                     outlet.open(name, &description, kind);
                 }
+                if let Some(watcher) = &mut self.watcher {
+                    feed.wakes(watcher);
+                }
                 self.feeds.push(feed);
             }
             // It went while it was looked at, and may come back.
@@ -292,6 +311,10 @@ impl<S: Source> Feed for FeedOf<S> {
             _ => Kind::Stream,
         };
         (self.from.description(), kind)
+    }
+
+    fn wakes(&self, watcher: &mut Watcher) {
+        self.from.wakes(watcher);
     }
 
     fn drain(&mut self, to: &mut Takers<'_, '_>, pace: &mut Pace) -> Result<(), ReceiveError> {

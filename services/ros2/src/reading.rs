@@ -10,7 +10,7 @@ use lager_battery::Battery;
 use lager_home::{Clock, LockError};
 use lager_journal::drawn;
 use lager_journal::shapes::{SceneUpdate, Time};
-use lager_ports::{Bus, OpenError, PortError, ReceiveError, Source as _, Subscriber};
+use lager_ports::{Bus, OpenError, PortError, ReceiveError, Source as _, Subscriber, Watcher};
 use lager_sample::{Part, Topic};
 use lager_stop::StopPage;
 use lager_topics::{
@@ -92,10 +92,10 @@ struct Feed<T: Topic> {
 }
 
 impl<T: Topic> Feed<T> {
-    fn open(bus: &Bus) -> Result<Self, PortError> {
-        Ok(Self {
-            subscriber: bus.subscriber()?,
-        })
+    fn open(bus: &Bus, watcher: &mut Watcher) -> Result<Self, PortError> {
+        let subscriber = bus.subscriber()?;
+        subscriber.wakes(watcher);
+        Ok(Self { subscriber })
     }
 
     /// Gives each new sample, with when it happened, to `take`.
@@ -226,7 +226,8 @@ pub fn run(
     ready: impl FnOnce(&str),
 ) -> Result<(), RunError> {
     let _one = bus.home().lock(bus.unit(), PART)?;
-    let mut feeds = watchdog.over("opening the topics", || Feeds::open(bus))?;
+    let mut watcher = watchdog.over("asking to be woken", || bus.watcher())?;
+    let mut feeds = watchdog.over("opening the topics", || Feeds::open(bus, &mut watcher))?;
     let mut node = Node::open(&settings.name, &settings.place)?;
     let mut writers = Writers::open(&mut node)?;
     let stop_word: PathBuf = bus.home().folder_of(bus.unit()).join(StopPage::FILE);
@@ -295,24 +296,24 @@ pub fn run(
             log::warn!("{said}");
         }
         services.turn(&node);
-        std::thread::sleep(pace.wait());
+        Watcher::pause(Some(&mut watcher), &mut pace);
     }
     Ok(())
 }
 
 impl Feeds {
-    fn open(bus: &Bus) -> Result<Self, PortError> {
+    fn open(bus: &Bus, watcher: &mut Watcher) -> Result<Self, PortError> {
         Ok(Self {
-            distance: Feed::open(bus)?,
-            line: Feed::open(bus)?,
-            steering: Feed::open(bus)?,
-            health: Feed::open(bus)?,
-            status: Feed::open(bus)?,
-            map: Feed::open(bus)?,
-            route: Feed::open(bus)?,
-            blocks: Feed::open(bus)?,
-            thoughts: Feed::open(bus)?,
-            truth: Feed::open(bus)?,
+            distance: Feed::open(bus, watcher)?,
+            line: Feed::open(bus, watcher)?,
+            steering: Feed::open(bus, watcher)?,
+            health: Feed::open(bus, watcher)?,
+            status: Feed::open(bus, watcher)?,
+            map: Feed::open(bus, watcher)?,
+            route: Feed::open(bus, watcher)?,
+            blocks: Feed::open(bus, watcher)?,
+            thoughts: Feed::open(bus, watcher)?,
+            truth: Feed::open(bus, watcher)?,
         })
     }
 
