@@ -54,7 +54,7 @@ pub struct Sides {
     due_us: u32,
     /// In 256ths of a duty step.
     bias: i16,
-    /// The bias before the last mark.
+    /// The bias before the last mark, as long as that may be a bar's.
     before: i16,
     /// Words until tape on both sides no longer counts as the line's end, or [`ENDED`].
     // One byte for both: with two, a step took so long that a byte from the Pi had to wait.
@@ -100,6 +100,7 @@ impl Sides {
         let before = self.end;
         if before != 0 && before != ENDED {
             self.end = before - 1;
+            self.settle();
         }
         match state {
             LineState::StationToLeft | LineState::StationToRight | LineState::FourWay => {
@@ -141,6 +142,14 @@ impl Sides {
     pub fn pause(&mut self) {
         self.mean = self.bias;
         self.seen = 0;
+        self.settle();
+    }
+
+    /// What the last mark has taught holds, if that was no bar.
+    fn settle(&mut self) {
+        if self.end == 0 {
+            self.before = self.bias;
+        }
     }
 
     /// Duty steps to add to the left side and to take from the right. `round` decides how the
@@ -323,6 +332,21 @@ mod tests {
         follow(&mut sides, -10, 100, LineState::StationToLeft);
         sides.pause();
         assert_eq!(sides.to_keep(kept), None);
+    }
+
+    #[test]
+    fn a_bar_that_has_taught_nothing_takes_nothing_back() {
+        for way_ms in [0, 500] {
+            let mut sides = Sides::new();
+            follow(&mut sides, 4, 10_000, LINE);
+            follow(&mut sides, 4, 100, MARK);
+            follow(&mut sides, 4, way_ms, LINE);
+            sides.pause();
+            follow(&mut sides, 4, 1_000, LINE);
+            follow(&mut sides, 4, 100, MARK);
+            follow(&mut sides, 4, 100, LineState::DropStation);
+            assert_about(bias(&sides), 4.0);
+        }
     }
 
     #[test]
