@@ -18,7 +18,7 @@
 //! The EEPROM keeps the bias, so that the first turn after a restart ends at its mark. It wears out
 //! after 100 000 writes of a byte, so only a bias is kept that is confirmed (the robot has stopped
 //! following, and no bar can take it back any more) and that differs from the kept one by half a
-//! duty step or more.
+//! duty step or more. A mission saves it once or twice at first, and then hardly ever.
 
 use lager_wire::LineState;
 
@@ -100,6 +100,12 @@ impl Sides {
         let before = self.end;
         if before != 0 && before != ENDED {
             self.end = before - 1;
+        }
+        let goes_on = matches!(
+            state,
+            LineState::OnLine | LineState::LeftOfLine | LineState::RightOfLine
+        );
+        if before == 1 && goes_on {
             self.settle();
         }
         match state {

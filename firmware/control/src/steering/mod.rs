@@ -241,7 +241,7 @@ impl SteeringUnit {
     }
 
     /// Begins and goes on to save.
-    // Not inlined, as `Sides::observe`: the wheels waited up to 7 % longer for a word.
+    // Not inlined, as `Sides::observe`.
     #[inline(never)]
     fn keep<B: SteeringBoard>(&mut self, board: &mut B) {
         if let Some(bias) = self.line.sides.to_keep(self.sides_store.kept()) {
