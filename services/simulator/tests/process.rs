@@ -195,9 +195,10 @@ fn what_a_board_keeps_without_power_is_there_after_a_restart() {
         steering.send(Payload::Setting(setting)).unwrap();
         let mut told = None;
         until("the answer", || {
-            let reply = |payload| match payload {
-                Payload::SettingReply(reply) => told = Some(reply.value),
-                _ => {}
+            let reply = |payload| {
+                if let Payload::SettingReply(reply) = payload {
+                    told = Some(reply.value);
+                }
             };
             steering.answer(reply).unwrap();
             told.is_some()
