@@ -35,6 +35,8 @@ pub static LAGER: Application = Application {
         "steering.tty",
         "clock",
         "eeprom",
+        "sensor.eeprom",
+        "steering.eeprom",
         "gag",
         "secret",
         "queue.toml",

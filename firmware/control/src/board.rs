@@ -7,7 +7,7 @@
 use lager_wire::{ResetCause, ResetOrder};
 
 /// How many bytes of EEPROM the boards use.
-pub const EEPROM_LENGTH: u8 = 128;
+pub const EEPROM_LENGTH: u8 = 192;
 
 /// What both boards have: a clock, the UART to the Pi, a watchdog.
 pub trait Board {

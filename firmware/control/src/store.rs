@@ -10,7 +10,7 @@
 //! A copy is valid if its layout and its check value are right; of two valid ones the later counter
 //! wins. A save clears the layout byte first and writes it last, so that a save that is cut off
 //! leaves the other copy valid. The chip needs some milliseconds for a byte: every step hands over
-//! at most one, and nothing waits. A board has two stores, each with a [`Place`] of its own.
+//! at most one, and nothing waits. Each store of a board has a [`Place`] of its own.
 //!
 //! What was in force before the last save can be had back. Then both copies hold it, so that having
 //! it back twice changes nothing.
@@ -38,9 +38,11 @@ pub(crate) enum Place {
     Settings = 0,
     /// What the Pi has told of the robot.
     Robot = 2 * SECOND,
+    /// How much the motors differ, which only the steering board learns.
+    Sides = 4 * SECOND,
 }
 
-const _: () = assert!(Place::Robot as u8 + 2 * SECOND == crate::EEPROM_LENGTH);
+const _: () = assert!(Place::Sides as u8 + 2 * SECOND == crate::EEPROM_LENGTH);
 
 /// A running save: the copy's bytes, and the index of the next one.
 #[derive(Debug, Clone)]
@@ -152,7 +154,8 @@ impl<const N: usize> Store<N> {
         }
         save.next += 1;
         if save.next > last {
-            self.slot = 2 * self.place as u8 + SECOND - self.slot;
+            let base = self.place as u8;
+            self.slot = base + (base + SECOND - self.slot);
             self.save = None;
             if core::mem::take(&mut self.twice)
                 && let Some(kept) = self.kept
@@ -160,6 +163,12 @@ impl<const N: usize> Store<N> {
                 self.begin(kept);
             }
         }
+    }
+
+    /// The settings in force in EEPROM, or in force when the save is done; `None` if there were
+    /// never any.
+    pub(crate) fn kept(&self) -> Option<[u8; N]> {
+        self.kept
     }
 
     /// Whether a save is under way.
@@ -246,10 +255,10 @@ mod tests {
     }
 
     #[test]
-    fn two_stores_do_not_touch_each_other() {
+    fn the_stores_do_not_touch_each_other() {
         let mut chip = Chip::erased();
         for round in 0..4 {
-            for place in [Place::Settings, Place::Robot] {
+            for place in [Place::Settings, Place::Robot, Place::Sides] {
                 let settings = [round, place as u8, 7];
                 let (mut store, before) = Store::load(&chip, place);
                 let kept = [round.wrapping_sub(1), place as u8, 7];

@@ -13,10 +13,7 @@
 
 pub mod chip;
 pub mod clock;
-mod eeprom;
 pub mod measure;
 pub mod pi;
 pub mod rig;
 pub mod shell;
-
-pub use eeprom::EepromError;

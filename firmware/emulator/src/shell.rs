@@ -20,12 +20,12 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
 use lager_plant::{Hand, Report, World, WorldState};
-use lager_pty::{Port, PtyError};
+use lager_pty::{EepromError, EepromFile, Port, PtyError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
 
+use crate::chip::EEPROM;
 use crate::clock::{ClockError, ClockPage, monotonic_ns};
-use crate::eeprom::{EepromError, EepromFile};
 use crate::rig::{Board, Images, Rig, RigError, RigOptions};
 
 /// The most chip time between two reads of the ports.
@@ -118,8 +118,9 @@ pub fn run(
     let mut eeproms = Vec::new();
     for board in Board::BOTH {
         if let Some(folder) = &config.eeprom {
-            let path = folder.join(board.name()).with_extension("eeprom");
-            eeproms.push((board, EepromFile::load(&path, rig.chip(board))?));
+            let file = EepromFile::open(folder, board.name())?;
+            rig.chip(board).set_eeprom(file.content());
+            eeproms.push((board, file));
         }
     }
     // No service follows the clock yet, so a wrong image stops the start and not a running robot.
@@ -227,7 +228,7 @@ impl Shell {
         if now >= self.eeprom_due {
             self.eeprom_due = now + EEPROM_PERIOD;
             for (board, file) in &mut self.eeproms {
-                file.save(self.rig.chip(*board))?;
+                file.save(&self.rig.chip(*board).eeprom(EEPROM))?;
             }
         }
         Ok(())

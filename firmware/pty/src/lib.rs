@@ -1,4 +1,4 @@
-//! A pty with a fixed name, in place of a board's USB cable.
+//! A pty with a fixed name, in place of a board's USB cable, and a file in place of its EEPROM.
 //!
 //! ```text
 //!   bridge --open--> /run/.../sensor --link--> /dev/pts/7 <==kernel==> master, held here
@@ -6,6 +6,10 @@
 //! As with a USB adapter, the port carries nothing while nobody has it open, and bytes that its
 //! reader does not fetch are lost; a write never waits. The link is replaced in one step, so the
 //! port is never missing, and `drop` removes it if it is still ours.
+
+mod eeprom;
+
+pub use eeprom::{EepromError, EepromFile};
 
 use std::ffi::OsStr;
 use std::fs;

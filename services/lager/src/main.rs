@@ -210,6 +210,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                         baud: config.serial.baud,
                         sensor_link,
                         steering_link,
+                        eeprom: config.chip.eeprom.clone(),
                         resume,
                     };
                     Ok(lager_simulator::run(bus, &simulator, &shutdown)?)

@@ -57,7 +57,12 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         config.serial.steering = Some(folder.steering_port());
     }
     match config.body {
-        Body::Sim => config.chip.clock = None,
+        Body::Sim => {
+            config.chip.clock = None;
+            if config.chip.eeprom.is_none() {
+                config.chip.eeprom = Some(folder.fresh_eeproms()?);
+            }
+        }
         Body::Chip => equip(&mut config, &folder)?,
         // The ports may belong to an emulator that somebody else runs.
         Body::Serial => {}

@@ -7,8 +7,8 @@
 //! `truth/pose`.
 //!
 //! A service on the Pi cannot tell these boards from real ones. The simulator does not know which
-//! services run. It reads only its own topic, from before its restart, and requests to change the
-//! world as a person's hands would.
+//! services run. It reads only its own topic and its boards' EEPROMs, from before its restart, and
+//! requests to change the world as a person's hands would.
 //!
 //! Safe state: the steering board's own. When a simulator ends, its robot is gone. In a restarted
 //! one both boards start with the motors off.

@@ -211,6 +211,18 @@ impl Robot {
         }
     }
 
+    /// Has a board that has not started yet find this in its EEPROM; what is missing was never
+    /// written.
+    pub fn set_eeprom(&mut self, wire: Wire, content: &[u8]) {
+        let eeprom = match wire {
+            Wire::Sensor => &mut self.sensor.chip.eeprom,
+            Wire::Steering => &mut self.steering.chip.eeprom,
+        };
+        for (byte, kept) in eeprom.iter_mut().zip(content) {
+            *byte = *kept;
+        }
+    }
+
     /// Resets a board now. The steering board's motors go off at once.
     pub fn reset_board(&mut self, wire: Wire, cause: ResetCause) {
         let now = self.now_ns;

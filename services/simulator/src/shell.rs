@@ -5,6 +5,7 @@
 //!              |
 //!   ports --bytes--> robot.advance_to(clock) --bytes--> ports
 //!                                  |--> truth/pose, 50 times a second and when goods change state
+//!                                  |--> what the boards' EEPROMs keep, ten times a second
 //!                                  '<-- world/request: what a person's hands would do
 //! ```
 //! Robot time is the bus's clock, so the robot runs at the same speed as all services. The loop
@@ -20,7 +21,7 @@ use std::path::PathBuf;
 use lager_home::Clock;
 use lager_plant::{Build, Warehouse, WarehouseError, World};
 use lager_ports::{Bus, Cause, KEPT_WAIT, PortError, Publisher, ReceiveError, SendError, Server};
-use lager_pty::{Port, PtyError};
+use lager_pty::{EepromError, EepromFile, Port, PtyError};
 use lager_topics::{TruthPose, WorldRequest};
 use lager_wake::Shutdown;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -36,6 +37,9 @@ const BATCH: Duration = Duration::from_micros(500);
 const LONGEST_SLEEP: Duration = Duration::from_millis(5);
 /// How much real time the world catches up with at once; for the rest it has stood still.
 const MADE_UP: Duration = Duration::from_millis(50);
+
+/// Time between two checks of the EEPROMs, in robot time.
+const EEPROM_PERIOD: Duration = Duration::from_millis(100);
 
 /// The configuration of the process.
 #[derive(Clone, Debug)]
@@ -54,6 +58,8 @@ pub struct SimulatorConfig {
     pub sensor_link: PathBuf,
     /// The path of the link to the steering board's port.
     pub steering_link: PathBuf,
+    /// The folder of the boards' EEPROM files, if they are to be kept.
+    pub eeprom: Option<PathBuf>,
     /// Whether to continue in the world that a killed predecessor has left on the bus, if it has.
     pub resume: bool,
 }
@@ -67,6 +73,9 @@ pub enum RunError {
     /// A port could not be made.
     #[error(transparent)]
     Pty(#[from] PtyError),
+    /// An EEPROM cannot be read.
+    #[error(transparent)]
+    Eeprom(#[from] EepromError),
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] PortError),
@@ -103,7 +112,18 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
             "goes on with the kept world"
         );
     }
+    let mut eeproms = Vec::new();
+    for (wire, board) in [(Wire::Sensor, "sensor"), (Wire::Steering, "steering")] {
+        if let Some(folder) = &config.eeprom {
+            let file = EepromFile::open(folder, board)?;
+            robot.set_eeprom(wire, file.content());
+            eeproms.push((wire, file));
+        }
+    }
     let mut shell = Shell {
+        eeproms,
+        eeprom_due: robot.now(),
+        is_lossy: false,
         truth: bus.publisher::<TruthPose>()?,
         truth_due: robot.now(),
         changes_told: robot.world().changes(),
@@ -149,6 +169,10 @@ struct Shell {
     warehouse: Warehouse,
     hands: Server<WorldRequest>,
     lines: [Line; 2],
+    eeproms: Vec<(Wire, EepromFile)>,
+    eeprom_due: Duration,
+    /// Whether it has been said that an EEPROM cannot be kept.
+    is_lossy: bool,
     truth: Publisher<TruthPose>,
     truth_due: Duration,
     changes_told: u64,
@@ -164,6 +188,7 @@ impl Shell {
             self.robot.advance_to(now);
             self.exchange();
             self.obey_hands()?;
+            self.keep_eeproms(now);
             self.tell_truth(now)?;
             let quiet = clock.real(self.robot.next_event().saturating_sub(now));
             self.sleep(quiet.clamp(BATCH, LONGEST_SLEEP));
@@ -194,6 +219,21 @@ impl Shell {
             }
             // Logged once each time a program opens the port.
             *lost = if port.is_open() { *lost + dropped } else { 0 };
+        }
+    }
+
+    /// Writes what the boards have changed. A robot whose folder is gone drives on.
+    fn keep_eeproms(&mut self, now: Duration) {
+        if now < self.eeprom_due {
+            return;
+        }
+        self.eeprom_due = now + EEPROM_PERIOD;
+        for (wire, file) in &mut self.eeproms {
+            if let Err(error) = file.save(self.robot.eeprom(*wire))
+                && !core::mem::replace(&mut self.is_lossy, true)
+            {
+                tracing::warn!("{error}");
+            }
         }
     }
 

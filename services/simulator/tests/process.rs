@@ -10,7 +10,9 @@ use lager_rig::{Domain, Host};
 use lager_simulator::{RunError, SimulatorConfig};
 use lager_topics::{Role, TruthPose};
 use lager_wake::Shutdown;
-use lager_wire::{Callsign, Command, Payload, ResetCause, SteerCommand, WheelCommand};
+use lager_wire::{
+    Callsign, Command, Payload, ResetCause, Setting, SettingKey, SteerCommand, WheelCommand,
+};
 
 /// The longest wait for any condition; after it a test fails instead of hanging.
 const WATCHDOG: Duration = Duration::from_secs(60);
@@ -40,6 +42,7 @@ impl OwnBus {
             baud: 500_000,
             sensor_link: self.0.files().join("sensor"),
             steering_link: self.0.files().join("steering"),
+            eeprom: Some(self.0.files().to_owned()),
             resume,
         }
     }
@@ -171,6 +174,43 @@ fn a_robot_is_driven_through_its_ports_and_goes_on_after_a_restart() {
     assert_eq!((resumed.left_duty, resumed.right_duty), (0, 0));
     assert_eq!(resumed.servo_position, kept.servo_position);
     simulator.stop();
+}
+
+#[test]
+fn what_a_board_keeps_without_power_is_there_after_a_restart() {
+    let place = OwnBus::new();
+    let link = place.config(false).steering_link;
+    for (seq, asked, in_force) in [(1, 9, 9), (2, -1, 9)] {
+        let simulator = place.start(false);
+        let mut steering = port(&link);
+        until("the steering board", || {
+            answer(&mut steering);
+            steering.link.is_up()
+        });
+        let setting = Setting {
+            key: SettingKey::GainP,
+            seq,
+            value: asked,
+        };
+        steering.send(Payload::Setting(setting)).unwrap();
+        let mut told = None;
+        until("the answer", || {
+            let reply = |payload| {
+                if let Payload::SettingReply(reply) = payload {
+                    told = Some(reply.value);
+                }
+            };
+            steering.answer(reply).unwrap();
+            told.is_some()
+        });
+        assert_eq!(told, Some(in_force));
+        let file = place.0.files().join("steering.eeprom");
+        until("the EEPROM's file", || {
+            std::fs::read(&file).is_ok_and(|kept| kept.len() == 4_096 && kept[..3] == [1, 1, 9])
+        });
+        drop(steering);
+        simulator.stop();
+    }
 }
 
 #[test]

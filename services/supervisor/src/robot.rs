@@ -51,7 +51,7 @@ pub struct Plan {
     pub talkers: Vec<Service>,
     /// The socket for robots of a station of its own.
     pub listener: Option<TcpListener>,
-    /// The folder of the EEPROMs of emulated boards.
+    /// The folder of the EEPROMs of simulated or emulated boards.
     pub eeprom: Option<PathBuf>,
     /// The copy of its warehouse's file, if it runs in one.
     pub warehouse: Option<WarehouseCopy>,

@@ -1,6 +1,6 @@
 //! The files of a running robot, in its folder of the bus ([`Home`]): the lock of its `up`, the
-//! effective configuration, the links to the simulated or emulated ports, an emulated body's clock
-//! and EEPROMs, the files of a station of its own, and the secret of its link. `state_folder.rs`
+//! effective configuration, the links to the simulated or emulated ports, an emulated body's clock,
+//! the boards' EEPROMs, the files of a station of its own, and the secret of its link. `state_folder.rs`
 //! has the files that outlive `up`.
 
 use std::fs::{self, OpenOptions};
@@ -26,6 +26,8 @@ const STEERING: &str = "steering.tty";
 /// An emulated body's clock page, and the folder of its boards' EEPROMs.
 const CLOCK: &str = "clock";
 const EEPROM: &str = "eeprom";
+/// The EEPROMs of a simulated body's boards.
+const EEPROMS: [&str; 2] = ["sensor.eeprom", "steering.eeprom"];
 /// The socket for a GaG of the robot's own station; one in the bus's folder is a shared station's.
 pub const GAG: &str = "gag";
 /// The station's queue while a script runs.
@@ -131,11 +133,18 @@ impl RuntimeFolder {
     /// # Errors
     /// The old one cannot be removed.
     pub fn fresh_clock(&self) -> Result<PathBuf> {
-        let path = self.path.join(CLOCK);
+        self.without(CLOCK)?;
+        Ok(self.path.join(CLOCK))
+    }
+
+    /// Makes sure that a file of an earlier robot is not there.
+    fn without(&self, file: &str) -> Result<()> {
+        let path = self.path.join(file);
         match fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error)
-                .with_context(|| format!("cannot remove the old clock page {}", path.display())),
-            _ => Ok(path),
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("cannot remove the old {}", path.display()))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -149,6 +158,16 @@ impl RuntimeFolder {
         let path = self.path.join(EEPROM);
         fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
         Ok(path)
+    }
+
+    /// The folder for the EEPROMs of simulated boards: this one. They outlive the simulator, and
+    /// go with the robot. Removes those of a killed robot, so that the new one's are erased.
+    ///
+    /// # Errors
+    /// The old ones cannot be removed.
+    pub fn fresh_eeproms(&self) -> Result<PathBuf> {
+        EEPROMS.iter().try_for_each(|file| self.without(file))?;
+        Ok(self.path.clone())
     }
 
     /// The link to the simulated port of the sensor board.
@@ -286,8 +305,8 @@ impl NameLock {
 }
 
 impl Drop for NameLock {
-    /// Removes everything of `up` after a clean end, except a stop that is set and the boards'
-    /// EEPROM.
+    /// Removes everything of `up` after a clean end, except a stop that is set and the EEPROM of
+    /// emulated boards.
     fn drop(&mut self) {
         if self.is_held() {
             self.place.forget(&self.robot, LAGER.kept);
@@ -335,9 +354,10 @@ mod tests {
     /// A file that this list lacks would stay for ever in the folder of a robot that was killed.
     #[test]
     fn all_that_a_robot_keeps_is_known_to_the_application() {
-        let known = [CONFIG, SENSOR, STEERING, CLOCK, EEPROM, GAG, QUEUE, SECRET];
-        for name in known {
-            assert!(LAGER.kept.contains(&name), "{name}");
+        let mut known = vec![CONFIG, SENSOR, STEERING, CLOCK, EEPROM, GAG, QUEUE, SECRET];
+        known.extend(EEPROMS);
+        for name in &known {
+            assert!(LAGER.kept.contains(name), "{name}");
         }
         assert_eq!(LAGER.kept.len(), known.len(), "{:?}", LAGER.kept);
     }

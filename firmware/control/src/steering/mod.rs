@@ -149,6 +149,8 @@ pub struct SteeringUnit {
     load: Load,
     /// The gains P and D in EEPROM.
     store: Store<2>,
+    /// How much the motors differ, in EEPROM.
+    sides_store: Store<2>,
     /// The robot in EEPROM.
     robot_store: Store<12>,
 }
@@ -161,6 +163,7 @@ impl SteeringUnit {
         let reset = board.reset_cause();
         let (store, kept) = Store::load(board, Place::Settings);
         let gains = kept.map_or(config.gains, |[p, d]| Gains { p, d });
+        let (sides_store, bias) = Store::load(board, Place::Sides);
         let (robot_store, kept) = Store::load(board, Place::Robot);
         let robot = kept
             .and_then(|kept| told::obeyed(&kept))
@@ -176,7 +179,7 @@ impl SteeringUnit {
             line: Line {
                 reader: LineReader::new(),
                 pd: Pd::new(gains),
-                sides: Sides::new(),
+                sides: Sides::of_kept(bias),
                 correction: 0,
                 fresh_since_us: None,
             },
@@ -194,6 +197,7 @@ impl SteeringUnit {
             reports: Reports::new(now_us),
             load: Load::new(now_us),
             store,
+            sides_store,
             robot_store,
             config,
         }
@@ -232,9 +236,21 @@ impl SteeringUnit {
         }
         self.report(board, now_us);
         self.follow(board, now_us);
-        self.store.poll(board);
-        self.robot_store.poll(board);
+        self.keep(board);
         true
+    }
+
+    /// Begins and goes on to save.
+    // Not inlined, as `Sides::observe`.
+    #[inline(never)]
+    fn keep<B: SteeringBoard>(&mut self, board: &mut B) {
+        if let Some(bias) = self.line.sides.to_keep(self.sides_store.kept()) {
+            self.sides_store.save(bias);
+        }
+        self.store.poll(board);
+        // Before the robot: a bias that another robot has learnt is gone when that is saved.
+        self.sides_store.poll(board);
+        self.robot_store.poll(board);
     }
 
     /// Reads the line and sets the wheels. It runs first in a step and again between long work, so
@@ -375,8 +391,9 @@ impl SteeringUnit {
             .link
             .us_to_syn(now_us)
             .map(|us| now_us.wrapping_add(us));
-        let save_us = (self.store.is_saving() || self.robot_store.is_saving())
-            .then(|| now_us.wrapping_add(EEPROM_POLL_US));
+        let saves =
+            self.store.is_saving() || self.sides_store.is_saving() || self.robot_store.is_saving();
+        let save_us = saves.then(|| now_us.wrapping_add(EEPROM_POLL_US));
         for other_us in [
             syn_us.or_else(|| self.report_due_us(now_us)),
             self.age.next_due_us(),

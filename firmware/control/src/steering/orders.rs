@@ -17,6 +17,7 @@ use lager_wire::{
 use super::ends::{End, Finish};
 use super::{ArmOrder, SteeringUnit};
 use crate::register::Receipt;
+use crate::sides::Sides;
 use crate::told::{self, Answer};
 use crate::{MOST_BYTES, Motor, SteeringBoard};
 
@@ -138,7 +139,8 @@ impl SteeringUnit {
     }
 
     /// Takes in what the Pi tells of the robot, which counts once it is whole. If it is not what was
-    /// in force, the wheels' command ends: it was given for another robot.
+    /// in force, the wheels' command ends: it was given for another robot. Other wheels, whose
+    /// motors may be swapped or reversed now, have their bias to learn.
     fn hear_robot(&mut self, setting: Setting, now_us: u32) -> Answer {
         let robot = self.robot();
         let Some((answer, told)) = self.told.hear(setting, &robot) else {
@@ -148,6 +150,10 @@ impl SteeringUnit {
             && told != robot
         {
             self.break_off(now_us);
+            if told.wheels != robot.wheels {
+                self.line.sides = Sides::new();
+                self.sides_store.save([0; 2]);
+            }
             self.wheels.set_profile(told.wheels);
             self.divider = told.divider;
         }

@@ -40,6 +40,7 @@ pub struct SteeringPins {
     pub resets: Vec<(ResetOrder, Option<(Motor, Motor)>)>,
     pub kicks: usize,
     pub eeprom: [u8; EEPROM_LENGTH as usize],
+    pub eeprom_writes: usize,
     /// Every step takes the processor this long.
     pub step_us: u32,
 }
@@ -73,6 +74,7 @@ impl Board for SteeringPins {
     }
     fn eeprom_write(&mut self, address: u8, value: u8) -> bool {
         self.eeprom[usize::from(address)] = value;
+        self.eeprom_writes += 1;
         true
     }
 }
@@ -132,6 +134,7 @@ impl Bench {
             resets: Vec::new(),
             kicks: 0,
             eeprom: [255; EEPROM_LENGTH as usize],
+            eeprom_writes: 0,
             step_us: 0,
         };
         let unit = SteeringUnit::new(&pins, config);

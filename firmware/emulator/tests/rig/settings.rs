@@ -5,13 +5,13 @@ use std::time::Duration;
 use lager_emulator::rig::Board;
 use lager_wire::{
     LineReading, Payload, Profile, Setting, SettingKey, SettingReply, SettingStatus,
-    SteeringProfile, WheelCommand, WheelsProfile,
+    SteeringProfile, WheelCommand, WheelsProfile, checksum,
 };
 
 use crate::support::Robot;
 
 /// How many bytes of EEPROM the boards use.
-const USED: usize = 128;
+const USED: usize = 192;
 
 /// Sends a setting to the steering board and returns its answer.
 fn set(robot: &mut Robot, value: i16) -> SettingReply {
@@ -127,6 +127,22 @@ fn how_the_motors_are_connected_is_told_and_outlives_the_power() {
     robot.run(Duration::from_millis(500));
     let kept = robot.rig.chip(Board::Steering).eeprom(USED);
     assert_eq!(forwards(&mut with_eeprom(&kept)), [-1, 1]);
+}
+
+#[test]
+fn how_much_the_motors_differ_is_kept_and_used_in_the_first_turn() {
+    // Four duty steps, in 256ths of one.
+    let mut copy = vec![1, 1, 0, 4];
+    copy.push(checksum(&copy));
+    let mut kept = vec![0xFF; USED];
+    kept[128..133].copy_from_slice(&copy);
+    let mut robot = with_eeprom(&kept);
+    robot.wheels(WheelCommand::Standby);
+    robot.run(Duration::from_millis(50));
+    robot.wheels(WheelCommand::LeftPerp);
+    robot.run(Duration::from_millis(50));
+    let [left, right] = robot.rig.duties();
+    assert_eq!((left, right), (-104, 96));
 }
 
 #[test]

@@ -20,7 +20,8 @@ section! {
         pub sensor_elf: Option<PathBuf> = None,
         pub steering_elf: Option<PathBuf> = None,
         /// Folder that keeps the EEPROM of both boards, which has their settings. Unset, it is in
-        /// the folder of the bus: the settings outlive the robot, but not a restart of the machine.
+        /// the folder of the bus: an emulated robot's settings outlive the robot, but not a restart
+        /// of the machine, and a simulated robot's outlive its simulator, but not the robot.
         pub eeprom: Option<PathBuf> = None,
         /// The file in which an emulator that somebody else runs at the ports of [serial] publishes
         /// the robot's time. With body = "chip", `up` chooses it.

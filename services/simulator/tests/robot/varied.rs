@@ -4,8 +4,8 @@ use core::f64::consts::{FRAC_PI_2, PI};
 use lager_floor::Node;
 
 use lager_plant::{Floor, NamedProduct, Obstacle, Warehouse};
-use lager_simulator::{CalibrateError, Robot, RobotOptions, calibrate};
-use lager_wire::{Command, LineState, WheelCommand};
+use lager_simulator::{CalibrateError, Robot, RobotOptions, Wire, calibrate};
+use lager_wire::{Command, LineState, ResetCause, WheelCommand};
 
 use crate::pi::{Pi, ms};
 
@@ -50,22 +50,29 @@ fn whatever_the_motors_are_a_line_is_followed_without_weaving() {
 }
 
 #[test]
-fn a_turn_stays_on_its_place_once_the_sides_are_known() {
-    for seed in 1..=20 {
+fn a_turn_stays_on_its_place_once_the_sides_are_known_also_after_a_restart() {
+    for (seed, restarts) in (1..=20).flat_map(|seed| [(seed, false), (seed, true)]) {
         let mut pi = varied(&without_goods(Node::new(4, 1), 50), seed);
         pi.wheels(WheelCommand::ActiveForward);
         // After two nodes the board has learnt how unequal the two sides are.
         pi.until(ms(40_000), |pi| pi.pose().x > 1_500.0);
         pi.wheels(WheelCommand::Standby);
         pi.run(ms(500));
+        if restarts {
+            pi.robot.reset_board(Wire::Steering, ResetCause::BrownOut);
+            pi.run(ms(500));
+        }
         pi.place(1_500.0, 0.0, 0.0);
         pi.carry_out(Command::Wheel(WheelCommand::LeftPerp), ms(6_000));
         pi.run(ms(500));
         let pose = pi.pose();
         let moved = (pose.x - 1_500.0).hypot(pose.y);
         let turned = pose.heading.to_degrees();
-        assert!(moved < 15.0, "seed {seed}: {moved} mm");
-        assert!((turned - 90.0).abs() < 8.0, "seed {seed}: {turned}");
+        assert!(moved < 15.0, "seed {seed}, {restarts}: {moved} mm");
+        assert!(
+            (turned - 90.0).abs() < 8.0,
+            "seed {seed}, {restarts}: {turned}"
+        );
     }
 }
 
