@@ -1,7 +1,7 @@
 //! The files of a running robot, in its folder of the bus ([`Home`]): the lock of its `up`, the
 //! effective configuration, the links to the simulated or emulated ports, an emulated body's clock,
-//! the boards' EEPROMs, the files of a station of its own, and the secret of its link. `state_folder.rs`
-//! has the files that outlive `up`.
+//! the boards' EEPROMs, the files of a station of its own, and the secret of its link.
+//! `state_folder.rs` has the files that outlive `up`.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
